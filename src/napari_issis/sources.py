@@ -1,0 +1,346 @@
+"""Source tables: one row a source, checked, with the units and defaults of the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Integral
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable, Table
+from numpy.typing import NDArray
+
+from .instrument import PIXEL_SCALE
+
+Array = NDArray[np.float64]
+
+KINDS = ("point", "uniform", "gaussian", "exponential", "devaucouleurs", "sersic")
+FLUX_UNIT = u.erg / u.s / u.cm**2 / u.AA
+COLUMNS = ("kind", "x", "y", "flux", "r_half", "ellipticity", "pa")
+# Defaults of the paper's "specific object" form.
+DEFAULT_FLUX = 1e-14
+DEFAULT_R_HALF = 20.0
+DEFAULT_ELLIPTICITY = 0.5
+DEFAULT_PA = 45.0
+# Sersic (1963) index of the kinds that are one.
+SERSIC_INDEX = {"gaussian": 0.5, "exponential": 1.0, "devaucouleurs": 4.0}
+INDEX_RANGE = (0.5, 8.0)
+
+
+@dataclass(frozen=True)
+class SourceArrays:
+    """A checked source table as plain arrays, all of shape (n,).
+
+    ``kind`` holds names of `KINDS`; ``x y r_half`` are in pixels, ``flux`` in
+    erg s-1 cm-2 A-1, ``pa`` in degrees. ``index`` is the Sersic index, NaN for points and
+    uniform ellipses. For points, ``r_half ellipticity pa`` are 0.
+    """
+
+    kind: NDArray[np.str_]
+    x: Array
+    y: Array
+    flux: Array
+    r_half: Array
+    ellipticity: Array
+    pa: Array
+    index: Array
+
+    def __len__(self) -> int:
+        return self.x.size
+
+    def take(self, rows: Any) -> SourceArrays:
+        """Return the chosen rows (an index array, a mask or a slice)."""
+        return SourceArrays(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+def source(
+    kind: str,
+    x: float,
+    y: float,
+    flux: Any = DEFAULT_FLUX,
+    r_half: Any = DEFAULT_R_HALF,
+    ellipticity: float = DEFAULT_ELLIPTICITY,
+    pa: Any = DEFAULT_PA,
+    n: float | None = None,
+) -> QTable:
+    """Make a source table of one row.
+
+    Parameters
+    ----------
+    kind : {"point", "uniform", "gaussian", "exponential", "devaucouleurs", "sersic"}
+        The profile.
+    x, y : float
+        Position of the centre in pixels; the centre of the first pixel is (0, 0).
+    flux : float or Quantity or Magnitude
+        Total flux in erg s-1 cm-2 A-1, or AB magnitude (with its unit).
+    r_half : float or Quantity
+        Semi-major axis of the ellipse that holds half of the light, in pixels (or an angle).
+    ellipticity : float
+        1 - b/a, in [0, 1).
+    pa : float or Quantity
+        Position angle of the major axis in degrees, from +y counter-clockwise towards -x.
+    n : float, optional
+        Sersic index, 0.5 to 8; for kind ``sersic`` only.
+
+    Returns
+    -------
+    astropy.table.QTable
+        Columns ``kind x y flux r_half ellipticity pa`` (and ``n``). Join tables with
+        `astropy.table.vstack`.
+
+    Raises
+    ------
+    ValueError
+        If a value is missing or out of range; the message names it.
+
+    Notes
+    -----
+    For a point the structure parameters are ignored.
+    """
+    if n is not None and kind != "sersic":
+        raise ValueError(f"n is {n}, but only sources of kind 'sersic' have an index.")
+    columns: dict[str, Any] = {
+        "kind": [str(kind)],
+        "x": [x],
+        "y": [y],
+        "flux": np.atleast_1d(_with_unit(flux, FLUX_UNIT)),
+        "r_half": np.atleast_1d(_with_unit(r_half, u.pix)),
+        "ellipticity": [ellipticity],
+        "pa": np.atleast_1d(_with_unit(pa, u.deg)),
+    }
+    if n is not None:
+        columns["n"] = [n]
+    table = QTable(columns)
+    check_sources(table)
+    for name in ("x", "y", "ellipticity", "n"):
+        if name in table.colnames:
+            table[name] = np.asarray(table[name], dtype=float)
+    return table
+
+
+def random_sources(
+    kind: str,
+    n: int,
+    *,
+    shape: tuple[int, int] = (512, 512),
+    flux: tuple[float, float] = (1e-15, 1e-14),
+    r_half: tuple[float, float] = (10.0, 30.0),
+    ellipticity: tuple[float, float] = (0.0, 0.8),
+    pa: tuple[float, float] = (0.0, 180.0),
+    index: tuple[float, float] = (0.5, 4.0),
+    flux_distribution: str = "uniform",
+    seed: int | None = None,
+) -> QTable:
+    """Draw a random population; the default ranges are the paper's.
+
+    Parameters
+    ----------
+    kind : str
+        As for `source`.
+    n : int
+        Number of sources.
+    shape : (int, int)
+        Frame ``(ny, nx)`` over which the positions are uniform.
+    flux : (float, float)
+        Limits in erg s-1 cm-2 A-1.
+    r_half, ellipticity, pa : (float, float)
+        Limits of the structure parameters (pixels, 1, degrees), each uniform between them.
+    index : (float, float)
+        Limits of the Sersic index, for kind ``sersic`` only.
+    flux_distribution : {"uniform", "log"}
+        Uniform in flux, or in its logarithm.
+    seed : int, optional
+        Seed; the same one draws the same population.
+
+    Returns
+    -------
+    astropy.table.QTable
+
+    Raises
+    ------
+    ValueError
+        If a limit is out of range or a pair is in the wrong order.
+    """
+    if not isinstance(n, Integral | np.integer) or isinstance(n, bool) or n < 0:
+        raise ValueError(f"n is {n!r}; the number of sources is a whole number, 0 or more.")
+    if kind not in KINDS:
+        raise ValueError(f"kind is {kind!r}; known: {', '.join(KINDS)}.")
+    if flux_distribution not in ("uniform", "log"):
+        raise ValueError(f"flux_distribution is {flux_distribution!r}; it is 'uniform' or 'log'.")
+    ny, nx = shape
+    rng = np.random.default_rng(seed)
+    count = int(n)
+    x = rng.uniform(-0.5, nx - 0.5, count)
+    y = rng.uniform(-0.5, ny - 0.5, count)
+    low, high = _limits("flux", flux, 0.0, np.inf)
+    if flux_distribution == "log":
+        if low <= 0:
+            raise ValueError(f"flux limits are {flux}; a log-uniform flux needs them above zero.")
+        fluxes = np.clip(np.exp(rng.uniform(np.log(low), np.log(high), count)), low, high)
+    else:
+        fluxes = rng.uniform(low, high, count)
+    table = QTable(
+        {
+            "kind": np.full(count, kind, dtype="U13"),
+            "x": x,
+            "y": y,
+            "flux": fluxes * FLUX_UNIT,
+            "r_half": rng.uniform(*_limits("r_half", r_half, 0.0, np.inf), count) * u.pix,
+            "ellipticity": rng.uniform(
+                *_limits("ellipticity", ellipticity, 0.0, np.nextafter(1.0, 0.0)), count
+            ),
+            "pa": rng.uniform(*_limits("pa", pa, -np.inf, np.inf), count) * u.deg,
+        }
+    )
+    if kind == "sersic":
+        table["n"] = rng.uniform(*_limits("index", index, *INDEX_RANGE), count)
+    check_sources(table)
+    return table
+
+
+def check_sources(
+    table: Table, *, pivot: float | None = None, pixel_scale: float = PIXEL_SCALE
+) -> SourceArrays:
+    """Check a source table and return its values as plain arrays.
+
+    Parameters
+    ----------
+    table : astropy.table.Table
+        A source table. Columns without a unit are taken in pixels, degrees and
+        erg s-1 cm-2 A-1.
+    pivot : float, optional
+        Wavelength in angstrom at which AB magnitudes become fluxes; without it magnitudes
+        are checked, and converted at 2500 A.
+    pixel_scale : float
+        Arcsec per pixel, for radii given as angles.
+
+    Raises
+    ------
+    ValueError
+        If a column is missing or a value out of range: the message names the row (from 0),
+        the column, the value and what is allowed.
+    """
+    missing = [name for name in COLUMNS[:4] if name not in table.colnames]
+    if missing:
+        raise ValueError(
+            f"the source table has no column {', '.join(missing)}; "
+            f"it needs {', '.join(COLUMNS)} (and n for Sersic profiles)."
+        )
+    kind = np.array([str(k).strip() for k in table["kind"]], dtype="U32")
+    for row in np.flatnonzero(~np.isin(kind, KINDS)):
+        raise ValueError(f"row {row}, kind: {kind[row]!r} is unknown; known: {', '.join(KINDS)}.")
+    extended = kind != "point"
+    if extended.any():
+        missing = [name for name in COLUMNS[4:] if name not in table.colnames]
+        if missing:
+            raise ValueError(
+                f"the source table has no column {', '.join(missing)}, "
+                f"which row {np.flatnonzero(extended)[0]} ({kind[extended][0]}) needs."
+            )
+    everything = np.ones(kind.size, dtype=bool)
+    x = _column(table, "x", u.pix, everything)
+    y = _column(table, "y", u.pix, everything)
+    flux = _column(table, "flux", FLUX_UNIT, everything, pivot=pivot or 2500.0)
+    _require("flux", flux, flux >= 0, everything, "zero or more erg s-1 cm-2 A-1")
+    r_half = _column(table, "r_half", u.pix, extended, pixel_scale=pixel_scale)
+    _require("r_half", r_half, r_half > 0, extended, "above 0 pixels")
+    ellipticity = _column(table, "ellipticity", u.dimensionless_unscaled, extended)
+    _require(
+        "ellipticity", ellipticity, (ellipticity >= 0) & (ellipticity < 1), extended, "in [0, 1)"
+    )
+    pa = _column(table, "pa", u.deg, extended)
+    sersic = kind == "sersic"
+    index = np.full(kind.size, np.nan)
+    for name, value in SERSIC_INDEX.items():
+        index[kind == name] = value
+    if sersic.any():
+        if "n" not in table.colnames:
+            raise ValueError(
+                f"the source table has no column n, "
+                f"the index that row {np.flatnonzero(sersic)[0]} (sersic) needs."
+            )
+        n = _column(table, "n", u.dimensionless_unscaled, sersic)
+        low, high = INDEX_RANGE
+        _require("n", n, (n >= low) & (n <= high), sersic, f"in [{low}, {high}]")
+        index[sersic] = n[sersic]
+    return SourceArrays(kind, x, y, flux, r_half, ellipticity, pa, index)
+
+
+def empty_sources() -> QTable:
+    """Make a source table with no rows."""
+    return random_sources("point", 0)
+
+
+def _with_unit(value: Any, unit: u.UnitBase) -> Any:
+    return value if hasattr(value, "unit") else np.asarray(value, dtype=float) * unit
+
+
+def _limits(name: str, pair: Any, least: float, most: float) -> tuple[float, float]:
+    try:
+        low, high = (float(v) for v in pair)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} is {pair!r}; give (lower, upper).") from None
+    if not (np.isfinite(low) and np.isfinite(high)):
+        raise ValueError(f"{name} limits are ({low}, {high}); they must be finite.")
+    if low > high:
+        raise ValueError(f"{name} limits are ({low}, {high}); the lower exceeds the upper one.")
+    if low < least or high > most:
+        raise ValueError(f"{name} limits are ({low}, {high}); allowed is {least} to {most}.")
+    return low, high
+
+
+def _column(
+    table: Table,
+    name: str,
+    unit: u.UnitBase,
+    used: NDArray[np.bool_],
+    *,
+    pivot: float | None = None,
+    pixel_scale: float | None = None,
+) -> Array:
+    """Values of a column in ``unit``; 0 in rows that do not use it; errors name the row."""
+    if name not in table.colnames or not used.any():
+        return np.zeros(len(table))
+    column = table[name]
+    mask = np.asarray(getattr(column, "mask", np.zeros(len(table), dtype=bool)))
+    for row in np.flatnonzero(used & mask):
+        raise ValueError(f"row {row}, {name}: the value is missing.")
+    given = getattr(column, "unit", None)
+    plain = getattr(column, "filled", lambda _: column)(np.nan) if mask.any() else column
+    try:
+        if given is None or given == unit:
+            values = np.asarray(getattr(plain, "value", plain), dtype=float)
+        elif pivot is not None:
+            values = u.Quantity(
+                plain.to(unit, u.spectral_density(pivot * u.AA))
+                if hasattr(plain, "to")
+                else (np.asarray(plain) * given).to(unit, u.spectral_density(pivot * u.AA))
+            ).value
+        else:
+            scale = [] if pixel_scale is None else u.pixel_scale(pixel_scale * u.arcsec / u.pix)
+            values = u.Quantity(plain, given).to_value(unit, scale)
+    except u.UnitConversionError:
+        raise ValueError(
+            f"column {name} has the unit {given}; it must be convertible to {unit}."
+        ) from None
+    except (TypeError, ValueError):
+        for row in np.flatnonzero(used):
+            try:
+                float(column[row])
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"row {row}, {name}: {column[row]!r} is not a number."
+                ) from None
+        raise
+    values = np.array(values, dtype=np.float64).reshape(len(table))
+    _require(name, values, np.isfinite(values), used, "a finite number")
+    values[~used] = 0.0
+    return values
+
+
+def _require(
+    name: str, values: Array, good: NDArray[np.bool_], used: NDArray[np.bool_], allowed: str
+) -> None:
+    for row in np.flatnonzero(used & ~good):
+        raise ValueError(f"row {row}, {name}: {values[row]:g} is not allowed; it must be {allowed}.")
