@@ -1,0 +1,247 @@
+"""Exposures as FITS files, and back, bit for bit.
+
+A file holds, in this order,
+
+* the counts as integers in the primary HDU, or compressed without loss in the extension
+  ``COUNTS`` behind an empty primary HDU;
+* ``EXPECTED``, the expected counts as 64-bit floats;
+* ``SOURCES``, the source table;
+* ``OBSERVATION``, one row with the exact values of the observation, of which the header's
+  cards are the readable copy;
+* ``PSF``, where an image serves as the PSF.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from astropy.coordinates import SkyCoord
+from astropy.io import fits
+from astropy.table import Table
+from numpy.typing import NDArray
+
+from .exposure import Exposure
+from .fits_header import observation_header, wcs_header
+from .fits_table import open_fits, read_table, table_hdu
+from .observation import Observation
+from .psf import PSF, GaussianPSF, ImagePSF, MoffatPSF, TelescopePSF
+from .safe_write import replacing
+from .sources import check_sources
+
+# Raised when a file of the new layout can no longer be read by the old program.
+LAYOUT = 1
+SUFFIXES = (".fits", ".fit", ".fts")
+
+
+def write_exposure(
+    exposure: Exposure,
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    compress: bool = False,
+) -> None:
+    """Write an exposure to a FITS file.
+
+    Parameters
+    ----------
+    exposure : Exposure
+        What to write.
+    path : path-like
+        The file; its name ends in ``.fits`` (or ``.fit``, ``.fts``).
+    overwrite : bool
+        Whether an existing file may be replaced. It is replaced as a whole once the new one
+        is complete.
+    compress : bool
+        Compress the counts without loss, tile by tile.
+
+    Raises
+    ------
+    ValueError
+        If the name does not end as above, or a column or the PSF cannot be stored.
+    OSError
+        If the file cannot be written; `FileExistsError` if it exists.
+    """
+    if not str(path).lower().endswith(SUFFIXES):
+        raise ValueError(f"{path} is no name for a FITS file; end it with .fits.")
+    cards = observation_header(exposure)
+    wcs = wcs_header(exposure.observation)
+    image = fits.Header([("BUNIT", "ct", "counts per pixel")])
+    image.update(wcs)
+    counts = _smallest(exposure.counts)
+    if compress:
+        algorithm = "RICE_1" if counts.dtype.itemsize == 4 else "GZIP_2"
+        hdus = [
+            fits.PrimaryHDU(header=cards),
+            fits.CompImageHDU(counts, cards + image, "COUNTS", compression_type=algorithm),
+        ]
+    else:
+        hdus = [fits.PrimaryHDU(counts, cards + image)]
+    hdus += [
+        fits.ImageHDU(np.asarray(exposure.expected, dtype=np.float64), image, "EXPECTED"),
+        table_hdu(exposure.sources, "SOURCES"),
+        table_hdu(_record(exposure), "OBSERVATION"),
+    ]
+    psf = exposure.observation.psf
+    if isinstance(psf, ImagePSF):
+        scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
+        hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
+    with replacing(path, overwrite=overwrite) as file:
+        fits.HDUList(hdus).writeto(file, output_verify="exception", checksum=True)
+
+
+def read_exposure(path: str | os.PathLike[str]) -> Exposure:
+    """Read an exposure that `write_exposure` wrote.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    Exposure
+        Equal to the one that was written, floats bit for bit.
+
+    Raises
+    ------
+    ValueError
+        If the file is empty, damaged, truncated, or holds no such exposure.
+    OSError
+        If it cannot be opened.
+    """
+    with open_fits(path) as hdus:
+        names = [hdu.name for hdu in hdus]
+        missing = [name for name in ("EXPECTED", "SOURCES", "OBSERVATION") if name not in names]
+        if missing:
+            raise ValueError(
+                f"the file holds no napari-issis exposure: it has no extension {missing[0]}."
+            )
+        record = read_table(hdus["OBSERVATION"])
+        if len(record) != 1 or "LAYOUT" not in record.colnames:
+            raise ValueError("the extension OBSERVATION is not that of a napari-issis exposure.")
+        if record["LAYOUT"][0] > LAYOUT:
+            raise ValueError("the file was written by a newer napari-issis; update the program.")
+        row = {name: record[name][0] for name in record.colnames}
+        observation = _observation(row, hdus)
+        sources = read_table(hdus["SOURCES"])
+        check_sources(sources)
+        counts = _image(hdus["COUNTS" if "COUNTS" in names else 0], observation.shape, "iu")
+        expected = _image(hdus["EXPECTED"], observation.shape, "f")
+        return Exposure(
+            counts=counts.astype(np.int64),
+            expected=expected.astype(np.float64),
+            sources=sources,
+            observation=observation,
+            seed=int(row["SEED"]),
+            clipped=float(row["CLIPPED"]),
+        )
+
+
+def _smallest(counts: NDArray[np.integer]) -> NDArray[np.integer]:
+    """Return counts as 32-bit integers where they fit, else as 64-bit ones."""
+    counts = np.asarray(counts)
+    fits_32 = counts.size == 0 or counts.max() <= np.iinfo(np.int32).max
+    return counts.astype(np.int32 if fits_32 else np.int64)
+
+
+def _image(hdu: Any, shape: tuple[int, int], dtype_kinds: str) -> NDArray[Any]:
+    name = hdu.name or "PRIMARY"
+    if not hdu.is_image or tuple(hdu.shape) != shape:
+        raise ValueError(f"{name} is not an image of {shape[1]} x {shape[0]} pixels.")
+    data = np.asarray(hdu.data)
+    if data.dtype.kind not in dtype_kinds:
+        raise ValueError(f"{name} holds values of type {data.dtype}.")
+    return data
+
+
+def _record(exposure: Exposure) -> Table:
+    """One row with every value that the observation is made of; NaN where there is none."""
+    observation = exposure.observation
+    pointing = observation.pointing
+    psf = observation.effective_psf
+    values: dict[str, Any] = {
+        "LAYOUT": LAYOUT,
+        "INSTRUME": observation.instrument,
+        "CHANNEL": observation.channel,
+        "FILTER1": observation.filters[0],
+        "FILTER2": observation.filters[1],
+        "EXPOSURE": observation.exposure,
+        "NY": observation.shape[0],
+        "NX": observation.shape[1],
+        "BACKGROUND": np.nan if observation.background is None else observation.background,
+        "RA": np.nan if pointing is None else float(pointing.ra.deg),
+        "DEC": np.nan if pointing is None else float(pointing.dec.deg),
+        "ROLL": observation.roll,
+        # as text: a seed may exceed 64 bits
+        "SEED": str(exposure.seed),
+        "CLIPPED": float(exposure.clipped),
+        "PSF_ASSUMED": observation.psf_assumed,
+        "PSF_TYPE": type(psf).__name__,
+        **_psf_values(psf),
+    }
+    return Table({name: [value] for name, value in values.items()})
+
+
+def _observation(row: dict[str, Any], hdus: fits.HDUList) -> Observation:
+    pointing = None
+    if not np.isnan(row["RA"]):
+        pointing = SkyCoord(row["RA"], row["DEC"], unit="deg", frame="icrs")
+    background = float(row["BACKGROUND"])
+    return Observation(
+        instrument=str(row["INSTRUME"]),
+        channel=str(row["CHANNEL"]),
+        filters=(str(row["FILTER1"]), str(row["FILTER2"])),
+        exposure=float(row["EXPOSURE"]),
+        shape=(int(row["NY"]), int(row["NX"])),
+        psf=None if row["PSF_ASSUMED"] else _psf(row, hdus),
+        background=None if np.isnan(background) else background,
+        pointing=pointing,
+        roll=float(row["ROLL"]),
+    )
+
+
+def _psf_values(psf: PSF) -> dict[str, Any]:
+    if type(psf) is TelescopePSF:
+        low, high = psf.band if isinstance(psf.band, tuple) else (psf.band, psf.band)
+        return {
+            "DIAMETER": psf.diameter,
+            "OBSCURATION": psf.obscuration,
+            "BAND_LOW": low,
+            "BAND_HIGH": high,
+            "BLUR_FWHM": psf.blur_fwhm,
+        }
+    if type(psf) is GaussianPSF:
+        return {"FWHM": psf.fwhm}
+    if type(psf) is MoffatPSF:
+        return {"FWHM": psf.fwhm, "BETA": psf.beta}
+    if type(psf) is ImagePSF:
+        return {"PIXEL_SCALE": psf.pixel_scale, "INCLUDES_PIXEL": psf.includes_pixel}
+    raise ValueError(
+        f"a PSF of type {type(psf).__name__} cannot be stored; "
+        "use a TelescopePSF, GaussianPSF, MoffatPSF or ImagePSF."
+    )
+
+
+def _psf(row: dict[str, Any], hdus: fits.HDUList) -> PSF:
+    kind = str(row["PSF_TYPE"])
+    if kind == "TelescopePSF":
+        return TelescopePSF(
+            float(row["DIAMETER"]),
+            float(row["OBSCURATION"]),
+            band=(float(row["BAND_LOW"]), float(row["BAND_HIGH"])),
+            blur_fwhm=float(row["BLUR_FWHM"]),
+        )
+    if kind == "GaussianPSF":
+        return GaussianPSF(float(row["FWHM"]))
+    if kind == "MoffatPSF":
+        return MoffatPSF(float(row["FWHM"]), float(row["BETA"]))
+    if kind == "ImagePSF":
+        array = np.asarray(hdus["PSF"].data, dtype=np.float64)
+        psf = ImagePSF(array, float(row["PIXEL_SCALE"]), bool(row["INCLUDES_PIXEL"]))
+        # The array was scaled to a sum of 1 before; a second time would move its last bits.
+        array.setflags(write=False)
+        object.__setattr__(psf, "array", array)
+        return psf
+    raise ValueError(f"the PSF is of the unknown type {kind!r}.")

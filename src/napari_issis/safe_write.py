@@ -1,0 +1,86 @@
+"""Write a file beside its target, then move it into place: the target is old or new, never half."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+
+def check_target(path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    """Check that a file may be written, and return its path with symbolic links followed.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to be written.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    FileExistsError
+        If the file exists and may not be replaced.
+    OSError
+        If the path is a directory or its folder does not exist.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise IsADirectoryError(f"cannot write {path}: it is a directory; give a file name.")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(
+            f"cannot write {path}: the folder {target.parent} does not exist; create it first."
+        )
+    if target.exists() and not overwrite:
+        raise FileExistsError(
+            f"{path} exists already; choose another name or allow it with overwrite=True."
+        )
+    return target
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[BinaryIO]:
+    """Open a temporary file that takes the target's place once it is complete.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to be written.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Yields
+    ------
+    binary file
+        In the target's folder. If the body of the ``with`` statement fails it is removed, and
+        the target stays as it was.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written; the message names it. `FileExistsError` if it exists
+        and may not be replaced.
+    """
+    target = check_target(path, overwrite=overwrite)
+    temporary = target.parent / f".napari-issis-{secrets.token_hex(8)}.part"
+    try:
+        try:
+            with temporary.open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            if target.exists():
+                check_target(path, overwrite=overwrite)
+                shutil.copymode(target, temporary)
+            os.replace(temporary, target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise OSError(f"cannot write {path}: {error.strerror or error}.") from error

@@ -1,0 +1,187 @@
+"""Built-in scenes: the three examples of the paper and a lensed quasar."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+from astropy.coordinates import SkyCoord
+from astropy.table import QTable, vstack
+
+from .catalogue import SUFFIXES, read_sources
+from .fits_io import SUFFIXES as FITS_SUFFIXES
+from .fits_io import read_exposure
+from .fits_table import open_fits
+from .instrument import PIXEL_SCALE
+from .observation import Observation
+from .sources import random_sources, source
+
+
+@dataclass(frozen=True)
+class ExampleScene:
+    """A scene that comes with the program.
+
+    Attributes
+    ----------
+    name : str
+        Short name, for the shell.
+    title : str
+        What it shows.
+    sources : astropy.table.QTable
+        The source table.
+    observation : Observation
+        How to observe it.
+    note : str
+        Where the values come from, and which are merely illustrative.
+    """
+
+    name: str
+    title: str
+    sources: QTable = field(repr=False)
+    observation: Observation
+    note: str
+
+
+def blend() -> ExampleScene:
+    """Two blended galaxies, example 1 of Shalyapin & Goicoechea (2014)."""
+    galaxies = [
+        source("exponential", 256, 256, flux=1e-14, r_half=20, ellipticity=0.7, pa=pa)
+        for pa in (45, 135)
+    ]
+    return ExampleScene(
+        "blend",
+        "Two galaxies that are blended together",
+        vstack(galaxies),
+        Observation(),
+        "Shalyapin & Goicoechea 2014, example 1: exponential profiles, all values from the paper.",
+    )
+
+
+def stars500() -> ExampleScene:
+    """500 random stars, example 2 of Shalyapin & Goicoechea (2014)."""
+    return ExampleScene(
+        "stars500",
+        "500 random stars",
+        random_sources("point", 500, seed=500),
+        Observation(),
+        "Shalyapin & Goicoechea 2014, example 2: the paper's ranges, a sample of our own. "
+        "Brighter than a photon-counting detector such as HST's SBC counts linearly.",
+    )
+
+
+def galaxies100() -> ExampleScene:
+    """100 random galaxies, example 3 of Shalyapin & Goicoechea (2014)."""
+    return ExampleScene(
+        "galaxies100",
+        "100 random galaxies",
+        random_sources("exponential", 100, seed=100),
+        Observation(),
+        "Shalyapin & Goicoechea 2014, example 3: exponential profiles, the paper's ranges, "
+        "a sample of our own.",
+    )
+
+
+# Offsets from image A in arcsec, east and north: CASTLES.
+Q2237_IMAGES = MappingProxyType(
+    {"A": (0.0, 0.0), "B": (-0.673, 1.697), "C": (0.635, 1.210), "D": (-0.866, 0.528)}
+)
+Q2237_LENS = (-0.075, 0.939)
+# erg s-1 cm-2 A-1 at 2500 A: CASTLES F814W magnitudes 15.92, 17.21, 16.77, 17.39 (Vega)
+# carried on by a power law lambda^-1.5; no ultraviolet photometry was found.
+Q2237_FLUX = MappingProxyType({"A": 2.9e-15, "B": 8.7e-16, "C": 1.3e-15, "D": 7.4e-16})
+# ICRS, degrees, of the system; good to about an arcsec.
+Q2237_POINTING = (340.1258, 3.35855)
+
+
+def q2237() -> ExampleScene:
+    """Make the lensed quasar Q2237+0305, the Einstein cross, centred on the lens galaxy."""
+    shape = (256, 256)
+
+    def position(east: float, north: float) -> tuple[float, float]:
+        x = (shape[1] - 1) / 2 - (east - Q2237_LENS[0]) / PIXEL_SCALE
+        y = (shape[0] - 1) / 2 + (north - Q2237_LENS[1]) / PIXEL_SCALE
+        return x, y
+
+    lens = source(
+        "devaucouleurs", *position(*Q2237_LENS), flux=3e-15, r_half=40, ellipticity=0.3, pa=65
+    )
+    images = [
+        source("point", *position(*Q2237_IMAGES[name]), flux=Q2237_FLUX[name])
+        for name in Q2237_IMAGES
+    ]
+    table = vstack([*images, lens])
+    table["name"] = [*Q2237_IMAGES, "G"]
+    return ExampleScene(
+        "q2237",
+        "Lensed quasar Q2237+0305: four images and the lens galaxy",
+        table,
+        Observation(shape=shape, pointing=SkyCoord(*Q2237_POINTING, unit="deg"), exposure=1000.0),
+        "Positions: CASTLES. Illustrative: the quasar's fluxes (F814W magnitudes carried on to "
+        "2500 A by a power law lambda^-1.5, without extinction) and the lens galaxy's flux, "
+        "size, shape and angle.",
+    )
+
+
+SCENES: Mapping[str, Callable[[], ExampleScene]] = MappingProxyType(
+    {make.__name__: make for make in (blend, stars500, galaxies100, q2237)}
+)
+
+
+def example_scene(name: str) -> ExampleScene:
+    """Make a built-in scene.
+
+    Parameters
+    ----------
+    name : str
+        One of `SCENES`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such scene; the message lists the known ones.
+    """
+    if name not in SCENES:
+        raise ValueError(f"there is no scene {name!r}; known: {', '.join(SCENES)}.")
+    return SCENES[name]()
+
+
+def load_scene(name_or_path: str | os.PathLike[str]) -> tuple[QTable, Observation]:
+    """Load a built-in scene or a file.
+
+    Parameters
+    ----------
+    name_or_path : str or path-like
+        The name of a built-in scene, a source table (ECSV, FITS, CSV), or a saved exposure.
+
+    Returns
+    -------
+    sources : astropy.table.QTable
+    observation : Observation
+        The saved exposure's, the built-in scene's, or the default one for a source table.
+
+    Raises
+    ------
+    ValueError
+        If there is no such scene, or the file is broken.
+    OSError
+        If the file cannot be opened.
+    """
+    name = str(name_or_path)
+    if name in SCENES:
+        scene = example_scene(name)
+        return scene.sources, scene.observation
+    if Path(name).suffix.lower() not in SUFFIXES and not Path(name).exists():
+        raise ValueError(
+            f"there is no scene {name!r}; known: {', '.join(SCENES)}; "
+            f"or give a source table ({', '.join(SUFFIXES)})."
+        )
+    if Path(name).suffix.lower() in FITS_SUFFIXES:
+        with open_fits(name) as hdus:
+            is_exposure = "OBSERVATION" in hdus
+        if is_exposure:
+            exposure = read_exposure(name)
+            return exposure.sources, exposure.observation
+    return read_sources(name), Observation()
