@@ -1,0 +1,440 @@
+"""The frequencies that meshes carry: paint, transform, filter, pass on, add up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, signal, sparse
+
+from ..sources import SourceArrays
+from .discs import disc_half_sizes, paint_discs
+from .gaussians import Gaussians
+from .optics import Transfer
+from .painting import paint
+from .plan import Plan
+
+Array = NDArray[np.float64]
+Spectrum = NDArray[np.complex128]
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a level's mesh.
+
+    ``start`` is the position in pixels of the first of ``count`` points, ``content`` the
+    interval that holds everything painted, ``frame`` the first and last mesh index (from
+    position 0) at which the result is wanted.
+    """
+
+    start: float
+    count: int
+    content: Interval
+    frame: tuple[int, int]
+
+
+def mesh_rate(
+    plan: Plan,
+    shape: tuple[int, int],
+    gaussians: Gaussians,
+    discs: SourceArrays,
+    disc_rate: Array,
+    allowed: float,
+) -> Array:
+    """Count rate, up to the frequencies that the meshes carry.
+
+    Parameters
+    ----------
+    plan : Plan
+        Cells and filters.
+    shape : (int, int)
+        Frame (ny, nx) in pixels.
+    gaussians : Gaussians
+        Points and smooth profiles.
+    discs : SourceArrays
+        Uniform ellipses.
+    disc_rate : ndarray
+        Their count rates.
+    allowed : float
+        Error in cps per pixel up to which the light of distant periodic images may be left in.
+
+    Returns
+    -------
+    ndarray, shape (ny, nx)
+    """
+    if not len(gaussians) and not len(discs):
+        return np.zeros(shape)
+    level_of, plain = _levels(plan, shape, gaussians)
+    disc_level = _first_in_reach(
+        plan, shape, discs.y, discs.x, disc_half_sizes(discs), np.zeros(len(discs), dtype=np.intp)
+    )
+    total = float(np.abs(gaussians.rate).sum() + np.abs(disc_rate).sum())
+    top = max(int(level_of.max(initial=0)), int(disc_level.max(initial=0)))
+    while _wings(plan, top, shape, total) > allowed:
+        top += 1
+    results = []
+    passed: Array | None = None
+    passed_axes: tuple[Interval, Interval] | None = None
+    frame = [(0, n - 1) for n in shape]
+    if plan.cell_size(0) < 1:
+        scale = round(1 / plan.cell_size(0))
+        frame = [(0, (n - 1) * scale) for n in shape]
+    else:
+        for _ in range(round(np.log2(plan.cell_size(0)))):
+            frame = [_coarser(f, plan.taps()) for f in frame]
+    frames = []
+    for level in range(top + 1):
+        if level:
+            # below one pixel the meshes are folded to the pixels' own rate
+            taps = plan.taps() if plan.cell_size(level) > 1 else 0
+            frame = [_coarser(f, taps) for f in frame]
+        frames.append(tuple(frame))
+        mine = level_of == level
+        here = _Level(
+            plan,
+            level,
+            top,
+            (frame[0], frame[1]),
+            gaussians.take(mine & plain),
+            gaussians.take(mine & ~plain),
+            discs.take(disc_level == level),
+            disc_rate[disc_level == level],
+            passed,
+            passed_axes,
+        )
+        if here.empty:
+            results.append(None)
+            continue
+        spectrum, onward = here.transform()
+        results.append(here.rate(spectrum, shape))
+        if level < top:
+            passed, passed_axes = here.pass_on(onward)
+    return _add_up(plan, results, frames, shape)
+
+
+def _levels(
+    plan: Plan, shape: tuple[int, int], gaussians: Gaussians
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Coarsest level that holds each Gaussian, and whether it needs no spreading there."""
+    with np.errstate(divide="ignore"):
+        own = np.floor(np.log2(gaussians.minor / (plan.plain() * plan.cell_size(0))))
+    own = np.maximum(own, 0).astype(np.intp)
+    half = (plan.cut() * np.sqrt(gaussians.yy), plan.cut() * np.sqrt(gaussians.xx))
+    level = _first_in_reach(plan, shape, gaussians.y, gaussians.x, half, own)
+    return level, (level == own) & (own > 0)
+
+
+def _first_in_reach(
+    plan: Plan,
+    shape: tuple[int, int],
+    y: Array,
+    x: Array,
+    half: tuple[Array, Array],
+    level: NDArray[np.intp],
+) -> NDArray[np.intp]:
+    """Raise levels until what lies at (y, x) is felt in the frame."""
+    away = np.maximum.reduce(
+        [
+            -(y + half[0]),
+            y - half[0] - (shape[0] - 1),
+            -(x + half[1]),
+            x - half[1] - (shape[1] - 1),
+            np.zeros_like(y),
+        ]
+    )
+    level = level.copy()
+    for _ in range(1100):  # doubling 2^-52 pixels that often passes the largest float
+        reach = np.array([_reach(plan, j) for j in range(int(level.max(initial=0)) + 1)])
+        beyond = away > reach[level]
+        if not beyond.any():
+            break
+        level[beyond] += 1
+    return level
+
+
+def _reach(plan: Plan, level: int) -> float:
+    """Reach of a level's kernel as felt in the frame and the margin that interpolation needs."""
+    cell = plan.cell_size(level)
+    return plan.reach(level) + (2 * plan.taps() * cell if cell > 1 else 0.0)
+
+
+def _wings(plan: Plan, top: int, shape: tuple[int, int], total: float) -> float:
+    """Light per pixel that periodic images would leave if ``top`` were the last level.
+
+    The share of a source's light further away than a period P is about 1 - |OTF(1/P)|.
+    """
+    period = max(shape) + 2 * plan.reach(top)
+    otf = plan.optics.transfer(np.array([0.0]), np.array([1 / period]))[0, 0]
+    return total * 4 * abs(1 - abs(otf)) / period**2
+
+
+class _Level:
+    """One mesh: what is painted on it, its transform and its contribution."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        level: int,
+        top: int,
+        frame: tuple[tuple[int, int], tuple[int, int]],
+        plain: Gaussians,
+        spread: Gaussians,
+        discs: SourceArrays,
+        disc_rate: Array,
+        passed: Array | None,
+        passed_axes: tuple[Interval, Interval] | None,
+    ) -> None:
+        self.plan, self.level, self.last = plan, level, level == top
+        self.cell = plan.cell_size(level)
+        self.empty = (
+            passed is None and not len(plain) and not len(spread) and not len(discs)
+        )
+        if self.empty:
+            return
+        sigma, cut = plan.spread() * self.cell, plan.cut()
+        disc_half = disc_half_sizes(discs)
+        axes = []
+        for axis in (0, 1):
+            low, high = frame[axis][0] * self.cell, frame[axis][1] * self.cell
+            reach = plan.reach(level)
+            # room for what is usually painted, so that the mesh and its filters stay the same
+            edge = reach + cut * sigma + 2 * self.cell
+            content = [low - edge, high + edge]
+            for centre, half in (
+                (
+                    (plain.y, plain.x)[axis],
+                    cut * np.sqrt((plain.yy, plain.xx)[axis]) + 2 * self.cell,
+                ),
+                (
+                    (spread.y, spread.x)[axis],
+                    cut * np.sqrt((spread.yy, spread.xx)[axis] + sigma**2) + 2 * self.cell,
+                ),
+                ((discs.y, discs.x)[axis], disc_half[axis] * 1.1 + cut * sigma + 12 * self.cell),
+            ):
+                if centre.size:
+                    content[0] = min(content[0], float((centre - half).min()))
+                    content[1] = max(content[1], float((centre + half).max()))
+            if passed_axes is not None:
+                content[0] = min(content[0], passed_axes[axis][0])
+                content[1] = max(content[1], passed_axes[axis][1])
+            axes.append(
+                _axis(
+                    (content[0], content[1]),
+                    frame[axis],
+                    reach,
+                    self.cell,
+                    0.0 if self.last else 2 * sigma * cut,
+                )
+            )
+        self.axes = (axes[0], axes[1])
+        self.shape = (axes[0].count, axes[1].count)
+        start = (axes[0].start, axes[1].start)
+        self.plain_mesh = self.low_mesh = None
+        if len(plain):
+            self.plain_mesh = np.zeros(self.shape)
+            paint(self.plain_mesh, start, self.cell, plain, 0.0, cut)
+        if len(spread) or len(discs) or passed is not None:
+            self.low_mesh = np.zeros(self.shape)
+            paint(self.low_mesh, start, self.cell, spread, sigma, cut)
+            paint_discs(self.low_mesh, start, self.cell, discs, disc_rate, sigma, cut)
+            if passed is not None and passed_axes is not None:
+                y, x = (round((passed_axes[a][0] - start[a]) / self.cell) for a in (0, 1))
+                self.low_mesh[y : y + passed.shape[0], x : x + passed.shape[1]] += passed
+
+    def transform(self) -> tuple[Spectrum, Spectrum]:
+        """Transform of the contribution, and that of the density to pass on."""
+        filters = _filters(self.plan, self.level, self.last, self.shape)
+        spectrum: Spectrum | None = None
+        onward: Spectrum | None = None
+        next_y, next_x = self._widening(2.0, 0.0)
+        if self.low_mesh is not None:
+            transformed = fft.rfft2(self.low_mesh, workers=-1)
+            spectrum = transformed * filters[0]
+            if not self.last:
+                more_y, more_x = self._widening(2.0, 1.0)
+                transformed *= more_y[:, None]
+                transformed *= more_x
+                onward = transformed
+        if self.plain_mesh is not None:
+            transformed = fft.rfft2(self.plain_mesh, workers=-1)
+            filtered = transformed * filters[1]
+            spectrum = filtered if spectrum is None else spectrum + filtered
+            if not self.last:
+                transformed *= next_y[:, None]
+                transformed *= next_x
+                onward = transformed if onward is None else onward + transformed
+        assert spectrum is not None
+        return spectrum, spectrum if onward is None else onward
+
+    def _widening(self, to: float, already: float) -> tuple[Array, Array]:
+        """Transform of the Gaussian that widens from ``already`` to ``to`` cells' spreading."""
+        sigma2 = (self.plan.spread() * self.cell) ** 2 * (to**2 - already**2)
+        ky, kx = fft.fftfreq(self.shape[0], self.cell), fft.rfftfreq(self.shape[1], self.cell)
+        return np.exp(-2 * np.pi**2 * sigma2 * ky**2), np.exp(-2 * np.pi**2 * sigma2 * kx**2)
+
+    def rate(self, spectrum: Spectrum, shape: tuple[int, int]) -> Array:
+        """Contribution at the mesh points of the frame, or at its pixels below one pixel."""
+        ny, nx = self.shape
+        cell = self.cell
+        while cell < 1:
+            spectrum, ny, nx, cell = fold(spectrum, ny, nx), ny // 2, nx // 2, 2 * cell
+        values = fft.irfft2(spectrum, (ny, nx), workers=-1)
+        index = []
+        for axis, count, n in zip(self.axes, (ny, nx), shape, strict=True):
+            first, last = (0, n - 1) if self.cell < 1 else axis.frame
+            index.append((np.arange(first, last + 1) - round(axis.start / cell)) % count)
+        wanted: Array = values[np.ix_(*index)]
+        return wanted
+
+    def pass_on(self, onward: Spectrum) -> tuple[Array, tuple[Interval, Interval]]:
+        """Density for the next level, spread for it and sampled on its mesh."""
+        ny, nx = self.shape
+        density = fft.irfft2(fold(onward, ny, nx), (ny // 2, nx // 2), workers=-1)
+        room = 2 * self.plan.spread() * self.cell * self.plan.cut()
+        index, intervals = [], []
+        for axis in self.axes:
+            first = int(np.ceil((axis.content[0] - room) / (2 * self.cell)))
+            last = int(np.floor((axis.content[1] + room) / (2 * self.cell)))
+            begin = round(axis.start / (2 * self.cell))
+            index.append(np.arange(first - begin, last + 1 - begin) % (axis.count // 2))
+            intervals.append((first * 2 * self.cell, last * 2 * self.cell))
+        return density[np.ix_(*index)], (intervals[0], intervals[1])
+
+
+def _axis(
+    content: Interval, frame: tuple[int, int], reach: float, cell: float, room: float
+) -> Axis:
+    """Lay out an axis so that neither the kernel nor what is passed on wraps into the frame."""
+    start = 2 * cell * np.floor((content[0] - room) / (2 * cell))
+    need = max(
+        content[1] + room - start,
+        frame[1] * cell + reach - content[0],
+        content[1] + reach - frame[0] * cell,
+    )
+    unit = max(2, round(2 / cell)) if cell < 1 else 2
+    count = unit * fft.next_fast_len(int(np.ceil((need / cell + 1) / unit)), real=True)
+    return Axis(float(start), int(count), content, frame)
+
+
+@lru_cache(maxsize=48)
+def _filters(plan: Plan, level: int, last: bool, shape: tuple[int, int]) -> tuple[Transfer, Transfer]:
+    """Filters of a mesh: for what is spread on it, and for what is painted as it is."""
+    cell = plan.cell_size(level)
+    ky, kx = fft.fftfreq(shape[0], cell), fft.rfftfreq(shape[1], cell)
+    limit = 0.5 / cell  # the mesh resolves nothing beyond
+    if plan.optics.radial:
+        # even in ky: half of the rows hold everything
+        half = shape[0] // 2 + 1
+        rows = np.minimum(np.arange(shape[0]), shape[0] - np.arange(shape[0]))
+        ky = np.abs(ky[:half])
+    else:
+        rows = np.arange(shape[0])
+    k = np.hypot(ky[:, None], kx)
+    transfer = plan.optics.transfer(ky, kx, limit)
+    beyond = 0.0 if last else plan.lowpass(k, level + 1)
+    sigma = plan.spread() * cell
+    with np.errstate(over="ignore"):
+        unspread = np.where(k <= limit, np.exp(2 * np.minimum(np.pi * sigma * k, 18.0) ** 2), 0.0)
+    low = transfer * (plan.lowpass(k, level) - beyond) * unspread
+    plain = transfer * (plan.lowpass(k, 0) - beyond)
+    return low[rows], plain[rows]
+
+
+
+
+def fold(spectrum: Spectrum, ny: int, nx: int) -> Spectrum:
+    """Half-spectrum of the real array that keeps every second point of either axis.
+
+    Parameters
+    ----------
+    spectrum : ndarray, shape (ny, nx // 2 + 1)
+        `rfft2` of a real array of shape (ny, nx), both even.
+    """
+    rows, m = ny // 2, nx // 2
+    folded = spectrum[:rows] + spectrum[rows:]
+    low = folded[:, : m // 2 + 1]
+    high = folded[:, m - m // 2 : m + 1][:, ::-1]
+    mirrored = np.roll(high[::-1], 1, axis=0).conj()
+    result: Spectrum = 0.25 * (low + mirrored)
+    return result
+
+
+def _coarser(frame: tuple[int, int], taps: int) -> tuple[int, int]:
+    """Mesh indices of the next level from which those of ``frame`` can be interpolated."""
+    return frame[0] // 2 - taps, -(-frame[1] // 2) + taps
+
+
+def _add_up(
+    plan: Plan,
+    results: list[Array | None],
+    frames: list[tuple[tuple[int, int], tuple[int, int]]],
+    shape: tuple[int, int],
+) -> Array:
+    """Interpolate the coarse levels down to the pixels and add all."""
+    image = np.zeros(shape)
+    carried: Array | None = None
+    at: tuple[tuple[int, int], tuple[int, int]] | None = None
+    for level in range(len(results) - 1, -1, -1):
+        cell, result = plan.cell_size(level), results[level]
+        if cell <= 1:
+            if carried is not None and at is not None:
+                image += _finer(plan, carried, at, ((0, shape[0] - 1), (0, shape[1] - 1)))
+                carried = None
+            if result is not None:
+                image += result
+            continue
+        if carried is not None and at is not None:
+            carried = _finer(plan, carried, at, frames[level])
+            carried = carried if result is None else carried + result
+        else:
+            carried = result
+        at = frames[level]
+    if carried is not None and at is not None:
+        cell = plan.cell_size(0)
+        while cell > 1:
+            cell /= 2
+            target = [(0, n - 1) for n in shape]
+            for _ in range(round(np.log2(cell))):
+                target = [_coarser(f, plan.taps()) for f in target]
+            carried = _finer(plan, carried, at, (target[0], target[1]))
+            at = (target[0], target[1])
+        image += carried
+    return image
+
+
+def _finer(
+    plan: Plan,
+    values: Array,
+    at: tuple[tuple[int, int], tuple[int, int]],
+    to: tuple[tuple[int, int], tuple[int, int]],
+) -> Array:
+    """Interpolate from one mesh to the next finer one."""
+    y = _interpolation(at[0], to[0], plan.taps(), plan.digits)
+    x = _interpolation(at[1], to[1], plan.taps(), plan.digits)
+    finer: Array = (x @ (y @ values).T).T
+    return finer
+
+
+@lru_cache(maxsize=64)
+def _interpolation(
+    at: tuple[int, int], to: tuple[int, int], taps: int, digits: float
+) -> sparse.csr_array:
+    """Matrix that interpolates halfway between mesh points by a Kaiser-windowed sinc."""
+    offset = np.arange(-taps, taps) + 0.5
+    attenuation = 20 / np.log(10) * digits
+    beta = signal.kaiser_beta(attenuation)
+    weight = np.sinc(offset) * np.i0(beta * np.sqrt(1 - (offset / (taps + 0.5)) ** 2))
+    weight /= weight.sum()
+    fine = np.arange(to[0], to[1] + 1)
+    even = np.flatnonzero(fine % 2 == 0)
+    odd = np.flatnonzero(fine % 2 != 0)
+    column = (fine[odd] // 2)[:, None] + np.arange(1 - taps, taps + 1) - at[0]
+    rows = np.concatenate([even, np.repeat(odd, 2 * taps)])
+    columns = np.concatenate([fine[even] // 2 - at[0], column.ravel()])
+    entries = np.concatenate([np.ones(even.size), np.tile(weight, odd.size)])
+    return sparse.csr_array(
+        (entries, (rows, columns)), shape=(fine.size, at[1] - at[0] + 1), dtype=np.float64
+    )

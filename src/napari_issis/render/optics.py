@@ -1,0 +1,65 @@
+"""The system's transfer function in cycles per pixel: OTF times the pixel's transform."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..psf import PSF, RadialPSF
+
+Array = NDArray[np.float64]
+Transfer = NDArray[np.float64] | NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Optics:
+    """A PSF as the detector's pixels see it.
+
+    Parameters
+    ----------
+    psf : PSF
+        The optical PSF.
+    pixel_scale : float
+        Arcsec per pixel.
+    """
+
+    psf: PSF
+    pixel_scale: float
+
+    @property
+    def radial(self) -> bool:
+        """Whether the OTF is real and even in either frequency."""
+        return isinstance(self.psf, RadialPSF)
+
+    @property
+    def extent(self) -> float:
+        """Half-size in pixels beyond which an image PSF is zero."""
+        return self.psf.extent / self.pixel_scale
+
+    def band_limit(self, threshold: float) -> float:
+        """Frequency in cycles per pixel beyond which the OTF is below ``threshold``."""
+        return self.psf.band_limit(threshold) * self.pixel_scale
+
+    def transfer(self, ky: Array, kx: Array, limit: float = np.inf) -> Transfer:
+        """OTF times the pixel's transform on the grid (ky, kx).
+
+        Parameters
+        ----------
+        ky, kx : ndarray
+            Frequencies in cycles per pixel, shapes (ny,) and (nx,).
+        limit : float
+            Beyond this frequency a radial OTF is not needed and 0 is returned.
+        """
+        if isinstance(self.psf, RadialPSF):
+            k = np.hypot(ky[:, None], kx[None, :])
+            transfer = np.zeros_like(k)
+            inside = k <= limit
+            transfer[inside] = self.psf.otf(k[inside] / self.pixel_scale)
+        else:
+            transfer = self.psf.otf_grid(ky / self.pixel_scale, kx / self.pixel_scale)
+        if not self.psf.includes_pixel:
+            transfer *= np.sinc(ky)[:, None]
+            transfer *= np.sinc(kx)[None, :]
+        return transfer

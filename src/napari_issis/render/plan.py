@@ -1,0 +1,139 @@
+"""How the spatial frequencies are split between stamps and meshes, for a given accuracy.
+
+The transfer function W is split by smooth low-pass filters G_0 > G_1 > ... of falling cut-off,
+
+    W = W (1 - G_0)  +  W (G_0 - G_1)  +  W (G_1 - G_2)  +  ...
+
+The first term is compact about each source, which is rendered alone on a stamp. Each of the
+others belongs to a mesh whose cells are twice as wide as the one's before; its kernel reaches
+twice as far, but always over the same number of cells. So the r^-3 wings of a diffraction PSF
+and the wings of de Vaucouleurs galaxies are followed as far as they matter at a cost that
+grows with the logarithm of the distance, and nothing wraps around. This is multilevel
+summation (Skeel, Tezcan & Hardy 2002, J. Comput. Chem. 23, 673) with exact convolutions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from ..psf import RadialPSF
+from .optics import Optics
+
+Array = NDArray[np.float64]
+
+# highest frequency used on a mesh, cycles per cell (0.5 would be its Nyquist frequency)
+BAND = 0.35
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Cells, filters and ranges for one transfer function and accuracy.
+
+    Parameters
+    ----------
+    optics : Optics
+        The transfer function.
+    digits : float
+        Natural logarithm of the accuracy: errors are about exp(-digits) of what they belong to.
+    cell : float
+        Cell of the finest mesh, pixels; a power of two.
+    stamps : bool
+        Whether frequencies above the finest mesh's band are rendered on stamps.
+    """
+
+    optics: Optics
+    digits: float
+    cell: float
+    stamps: bool
+
+    def cell_size(self, level: int) -> float:
+        """Cell of a mesh in pixels."""
+        return self.cell * 2.0**level
+
+    def lowpass(self, k: Array, level: int) -> Array:
+        """G of a level at frequencies k; it vanishes above the band of that level's mesh."""
+        if level == 0 and not self.stamps:
+            return np.ones_like(k)
+        width = self._width(level)
+        return 0.5 * special.erfc((k - 1.4 * np.sqrt(self.digits) * width) / width)
+
+    def _width(self, level: int) -> float:
+        """Width of the error function at the filter's edge.
+
+        The edge is centred so that both the filter beyond the band and the share of wide
+        Gaussians that it leaves to the finer levels are below exp(-digits).
+        """
+        return float(BAND / self.cell_size(level) / (2.4 * np.sqrt(self.digits)))
+
+    def spread(self) -> float:
+        """Width in cells of the Gaussian with which points are spread on a mesh.
+
+        Its aliases, exp(-2 pi^2 sigma^2 ((1 - BAND)^2 - BAND^2)), are below exp(-digits).
+        """
+        return float(np.sqrt(self.digits / (2 * np.pi**2 * (1 - 2 * BAND))))
+
+    def plain(self) -> float:
+        """Width in cells from which a Gaussian is band-limited on a mesh by itself."""
+        return float(np.sqrt(self.digits / 2) / (np.pi * BAND))
+
+    def cut(self) -> float:
+        """Distance in standard deviations at which a painted Gaussian is cut.
+
+        Dividing by the spreading Gaussian's transform amplifies the cut.
+        """
+        return float(np.sqrt(2 * 1.25 * self.digits))
+
+    def taps(self) -> int:
+        """Half-length in cells of the filter that interpolates from one mesh to the next finer.
+
+        Kaiser's estimate for a transition of 1 - 2 BAND cycles per cell.
+        """
+        attenuation = 20 / np.log(10) * self.digits
+        length = (attenuation - 7.95) / (2.285 * 2 * np.pi * (1 - 2 * BAND))
+        return int(np.ceil(length / 2)) + 1
+
+    def reach(self, level: int) -> float:
+        """Distance in pixels to which a level's kernel is felt; level -1 is the stamps'."""
+        return _reach(self, level)
+
+
+@lru_cache(maxsize=256)
+def _reach(plan: Plan, level: int) -> float:
+    # the filter's edge has the transform exp(-pi^2 width^2 r^2)
+    window = float(np.sqrt(plan.digits) / (np.pi * plan._width(level + 1)))
+    psf = plan.optics.psf
+    if not isinstance(psf, RadialPSF):
+        return window + plan.optics.extent
+    return window if level > 2 else max(window, _ring_reach(plan, psf, level, window))
+
+
+def _ring_reach(plan: Plan, psf: RadialPSF, level: int, start: float) -> float:
+    """Distance at which a kernel's rings are below the accuracy.
+
+    The edges of the aperture and of its obscuration make rings that fall like r^-3 only. They
+    are measured on the kernel, the Hankel transform of its filter, out to six times the
+    filter's own reach, and beyond that by their law.
+    """
+    limit = plan.optics.band_limit(0.1 * np.exp(-plan.digits))
+    if limit <= 0:
+        return start
+    r = start * np.geomspace(1.0, 6.0, 400)
+    x, weight = np.polynomial.legendre.leggauss(int(np.pi * limit * r[-1]) + 200)
+    k = 0.5 * limit * (x + 1)
+    # the pixel as a Gaussian of the same variance: the mean over angle is what matters here
+    pixel = np.exp(-(np.pi**2) * k**2 / 6)
+    measure = weight * k * pixel * psf.otf(k / plan.optics.pixel_scale)
+    passed = np.ones_like(k) if level < 0 else plan.lowpass(k, level)
+    band = measure * (passed - plan.lowpass(k, level + 1))
+    kernel = np.abs(special.j0(2 * np.pi * np.outer(r, k)) @ band) / abs(measure.sum())
+    envelope = np.maximum.accumulate(kernel[::-1])[::-1]
+    allowed = 0.3 * np.exp(-plan.digits)
+    below = np.flatnonzero(envelope <= allowed)
+    if below.size:
+        return float(r[below[0]])
+    return float(r[-1] * (envelope[-40] / allowed) ** (1 / 3))

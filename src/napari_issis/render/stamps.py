@@ -1,0 +1,282 @@
+"""The frequencies above the meshes' band: each source on a stamp of its own.
+
+On a stamp the filtered kernel is a Fourier series whose period is twice the kernel's reach, and
+the image of a source a product of three small matrices: phases of the rows, the spectrum,
+phases of the columns. A source's sub-pixel position enters through the phases alone, exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sources import SourceArrays
+from .discs import disc_half_sizes, elliptical_frequency
+from .optics import Transfer
+from .plan import Plan
+from .profiles import disc_transform, sersic_gaussians, sersic_transform
+
+Array = NDArray[np.float64]
+CHUNK = 32
+
+
+def add_stamps(
+    image: Array, plan: Plan, sources: SourceArrays, rate: Array, allowed: float
+) -> None:
+    """Add the high frequencies of every source to an image.
+
+    Parameters
+    ----------
+    image : ndarray, shape (ny, nx)
+        Count rate in cps per pixel, added to in place.
+    plan : Plan
+        The split of the frequencies.
+    sources : SourceArrays
+        The scene.
+    rate : ndarray, shape (n,)
+        Count rates of the sources.
+    allowed : float
+        Sources whose high frequencies amount to less than this, in cps per pixel, are left
+        out, and so are frequencies that add up to less.
+    """
+    reach = plan.reach(-1)
+    is_point = sources.kind == "point"
+    near = _within(sources, np.full(len(sources), reach), image.shape) & (rate != 0)
+    points = is_point & near
+    _add_points(image, plan, sources.y[points], sources.x[points], rate[points], reach)
+    for i in np.flatnonzero(~is_point & (rate != 0)):
+        _add_extended(image, plan, sources.take(slice(i, i + 1)), float(rate[i]), reach, allowed)
+
+
+def _within(sources: SourceArrays, half: Array, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    near: NDArray[np.bool_] = (
+        (sources.y > -half - 1)
+        & (sources.y < shape[0] + half)
+        & (sources.x > -half - 1)
+        & (sources.x < shape[1] + half)
+    )
+    return near
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Frequencies of a stamp: ``k`` >= 0 with weights 1 for zero and 2 for the others."""
+
+    half: int
+    k: Array
+    weight: Array
+
+    @property
+    def offsets(self) -> Array:
+        """Pixels of the stamp relative to its central one."""
+        return np.arange(-self.half, self.half + 1.0)
+
+    def tables(self) -> tuple[Array, Array]:
+        """Cosine and sine of 2 pi k m, shape (2 half + 1, len(k))."""
+        angle = 2 * np.pi * np.outer(self.offsets, self.k)
+        return np.cos(angle), np.sin(angle)
+
+
+@lru_cache(maxsize=256)
+def _grid(half: int, reach: int, limit: float) -> _Grid:
+    period = half + reach + 2
+    count = int(np.ceil(limit * period))
+    k = np.arange(count + 1) / period
+    weight = np.where(k == 0, 1.0, 2.0) / period
+    return _Grid(half, k, weight)
+
+
+@lru_cache(maxsize=8)
+def _point_spectrum(plan: Plan, half: int, reach: int, limit: float) -> Transfer:
+    """High-passed transfer function on the quadrant (radial) or the full grid of a stamp."""
+    grid = _grid(half, reach, limit)
+    if plan.optics.radial:
+        return _high_pass(plan, grid.k, grid.k) * grid.weight[:, None] * grid.weight
+    return _high_pass(plan, _both_signs(grid.k), grid.k) * (grid.weight / grid.weight[0]) * (
+        grid.weight[0] ** 2
+    )
+
+
+def _both_signs(k: Array) -> Array:
+    return np.concatenate([-k[:0:-1], k])
+
+
+def _high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
+    k = np.hypot(ky[:, None], kx)
+    transfer: Transfer = plan.optics.transfer(ky, kx) * (1 - plan.lowpass(k, 0))
+    return transfer
+
+
+def _limit(plan: Plan) -> float:
+    return plan.optics.band_limit(0.1 * np.exp(-plan.digits))
+
+
+def _turned(grid: _Grid, shift: Array) -> tuple[Array, Array]:
+    """Cosine and sine of 2 pi k (m - shift) for each shift, shape (n, 2 half + 1, len(k))."""
+    cos_m, sin_m = grid.tables()
+    angle = 2 * np.pi * np.outer(shift, grid.k)
+    cos_s, sin_s = np.cos(angle)[:, None, :], np.sin(angle)[:, None, :]
+    return cos_m * cos_s + sin_m * sin_s, sin_m * cos_s - cos_m * sin_s
+
+
+def _add_points(
+    image: Array, plan: Plan, y: Array, x: Array, rate: Array, reach: float
+) -> None:
+    half = int(np.ceil(reach))
+    limit = _limit(plan)
+    if not y.size or limit <= 0:
+        return
+    grid = _grid(half, half, limit)
+    spectrum = _point_spectrum(plan, half, half, limit)
+    row, column = np.rint(y), np.rint(x)
+    for first in range(0, y.size, CHUNK):
+        part = slice(first, first + CHUNK)
+        cos_y, sin_y = _turned(grid, y[part] - row[part])
+        cos_x, sin_x = _turned(grid, x[part] - column[part])
+        cos_y *= rate[part, None, None]
+        sin_y *= rate[part, None, None]
+        stamps = _images(spectrum, None, cos_y, sin_y, cos_x, sin_x)
+        for stamp, r, c in zip(stamps, row[part], column[part], strict=True):
+            _place(image, stamp, int(r) - half, int(c) - half)
+
+
+def _images(
+    even: Transfer, odd: Array | None, cos_y: Array, sin_y: Array, cos_x: Array, sin_x: Array
+) -> Array:
+    """Stamps from spectra.
+
+    A real spectrum comes as two quadrants, even in both frequencies and odd in both; a complex
+    one, Hermitian, on all ky and kx >= 0.
+    """
+    turn = (0, 2, 1)
+    if not np.iscomplexobj(even):
+        stamps: Array = cos_y @ even @ cos_x.transpose(turn)
+        if odd is not None:
+            stamps -= sin_y @ odd @ sin_x.transpose(turn)
+        return stamps
+    phase_y = np.concatenate(
+        [(cos_y - 1j * sin_y)[..., :0:-1], cos_y + 1j * sin_y], axis=-1
+    )
+    half_way = phase_y @ even
+    result: Array = half_way.real @ cos_x.transpose(turn) - half_way.imag @ sin_x.transpose(turn)
+    return result
+
+
+def _add_extended(
+    image: Array, plan: Plan, one: SourceArrays, rate: float, reach: float, allowed: float
+) -> None:
+    limit = _needed_limit(plan, one, rate, allowed)
+    if limit <= 0:
+        return
+    half_y, half_x = _half_sizes(plan, one, rate, reach, allowed)
+    row, column = round(float(one.y[0])), round(float(one.x[0]))
+    if not (-half_y <= row < image.shape[0] + half_y and -half_x <= column < image.shape[1] + half_x):
+        return
+    grid_y, grid_x = _grid(half_y, half_y, limit), _grid(half_x, half_x, limit)
+    cos_y, sin_y = _turned(grid_y, one.y - row)
+    cos_x, sin_x = _turned(grid_x, one.x - column)
+    ky, kx = _both_signs(grid_y.k), grid_x.k
+    transform = _transform(one, ky, kx) * rate
+    if plan.optics.radial:
+        filtered = _quadrant_filter(plan, half_y, half_x, limit)
+        count = grid_y.k.size
+        upper, lower = transform[count - 1 :], transform[count - 1 :: -1]
+        even = 0.5 * (upper + lower) * filtered
+        odd = 0.5 * (upper - lower) * filtered
+        stamp = _images(even, odd, cos_y, sin_y, cos_x, sin_x)[0]
+    else:
+        spectrum = _high_pass(plan, ky, kx) * transform * grid_x.weight * grid_y.weight[0]
+        stamp = _images(spectrum, None, cos_y, sin_y, cos_x, sin_x)[0]
+    _place(image, stamp, row - half_y, column - half_x)
+
+
+@lru_cache(maxsize=256)
+def _quadrant_filter(plan: Plan, half_y: int, half_x: int, limit: float) -> Transfer:
+    grid_y, grid_x = _grid(half_y, half_y, limit), _grid(half_x, half_x, limit)
+    filtered: Transfer = (
+        _high_pass(plan, grid_y.k, grid_x.k) * grid_y.weight[:, None] * grid_x.weight
+    )
+    return filtered
+
+
+def _transform(one: SourceArrays, ky: Array, kx: Array) -> Array:
+    """Transform of a source's unit-flux profile, centred, on the grid (ky, kx)."""
+    q = elliptical_frequency(
+        ky, kx, float(one.r_half[0]), float(one.ellipticity[0]), float(one.pa[0])
+    )
+    if one.kind[0] == "uniform":
+        return disc_transform(q)
+    return sersic_transform(float(one.index[0]))(q)
+
+
+def _needed_limit(plan: Plan, one: SourceArrays, rate: float, allowed: float) -> float:
+    """Frequency beyond which a source's high-passed spectrum adds up to less than allowed."""
+    limit = _limit(plan)
+    if limit <= 0:
+        return 0.0
+    count = 160
+    k = (np.arange(count) + 0.5) * (limit / count)
+    angle = (np.arange(24) + 0.5) * (np.pi / 24)
+    ky, kx = np.outer(k, np.sin(angle)), np.outer(k, np.cos(angle))
+    pa = np.radians(one.pa[0])
+    along = ky * np.cos(pa) - kx * np.sin(pa)
+    across = (1 - one.ellipticity[0]) * (ky * np.sin(pa) + kx * np.cos(pa))
+    q = 2 * np.pi * one.r_half[0] * np.hypot(along, across)
+    if one.kind[0] == "uniform":
+        # the envelope of 2 J1(z) / z
+        z = np.sqrt(2) * q
+        profile = np.minimum(1.0, 2 * np.sqrt(2 / np.pi) * z**-1.5)
+    else:
+        profile = sersic_transform(float(one.index[0]))(q)
+    amplitude = profile.mean(axis=1) * _radial_high_pass(plan, limit, count)
+    tail = np.cumsum((2 * np.pi * k * amplitude)[::-1])[::-1] * (limit / count) * abs(rate)
+    needed = np.flatnonzero(tail > allowed)
+    return float(k[needed[-1]] + limit / count) if needed.size else 0.0
+
+
+@lru_cache(maxsize=16)
+def _radial_high_pass(plan: Plan, limit: float, count: int) -> Array:
+    k = (np.arange(count) + 0.5) * (limit / count)
+    zero = np.zeros(1)
+    transfer = np.maximum(
+        np.abs(plan.optics.transfer(zero, k)[0]), np.abs(plan.optics.transfer(k, zero)[:, 0])
+    )
+    return np.asarray(transfer * (1 - plan.lowpass(k, 0)))
+
+
+def _half_sizes(
+    plan: Plan, one: SourceArrays, rate: float, reach: float, allowed: float
+) -> tuple[int, int]:
+    """Half-sizes (y, x) of the stamp: the kernel's reach and the source's own."""
+    if one.kind[0] == "uniform":
+        half_y, half_x = disc_half_sizes(one)
+        return int(np.ceil(half_y[0] + reach)), int(np.ceil(half_x[0] + reach))
+    gaussians = sersic_gaussians(float(one.index[0]), plan.digits + 3)
+    limit = _limit(plan)
+    count = 160
+    k = (np.arange(count) + 0.5) * (limit / count)
+    amplitude = 2 * np.pi * k * _radial_high_pass(plan, limit, count) * (limit / count)
+    major = one.r_half[0] * gaussians.sigma
+    minor = major * (1 - one.ellipticity[0])
+    level = np.exp(-2 * (np.pi * minor[:, None] * k) ** 2) @ amplitude
+    felt = np.abs(rate * gaussians.fraction) * level > 0.1 * allowed
+    widest = float(major[felt].max(initial=0.0))
+    pa = np.radians(one.pa[0])
+    ratio = 1 - one.ellipticity[0]
+    sizes = []
+    for direction in (np.hypot(np.cos(pa), ratio * np.sin(pa)), np.hypot(np.sin(pa), ratio * np.cos(pa))):
+        own = np.sqrt(2 * plan.digits) * widest * direction
+        sizes.append(int(np.ceil(np.hypot(reach, own))))
+    return sizes[0], sizes[1]
+
+
+def _place(image: Array, stamp: Array, row: int, column: int) -> None:
+    """Add the part of a stamp that lies in the image; (row, column) is its first pixel."""
+    top, left = max(row, 0), max(column, 0)
+    bottom = min(row + stamp.shape[0], image.shape[0])
+    right = min(column + stamp.shape[1], image.shape[1])
+    if top < bottom and left < right:
+        image[top:bottom, left:right] += stamp[top - row : bottom - row, left - column : right - column]
