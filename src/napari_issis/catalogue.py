@@ -103,7 +103,7 @@ def write_sources(table: Table, path: str | os.PathLike[str], *, overwrite: bool
     check_sources(table)
     if suffix in FITS_SUFFIXES:
         hdus = fits.HDUList([fits.PrimaryHDU(), table_hdu(table, "SOURCES")])
-        with replacing(path, overwrite=overwrite) as file:
+        with replacing(path, SUFFIXES, overwrite=overwrite) as file:
             hdus.writeto(file, output_verify="exception", checksum=True)
         return
     text = StringIO()
@@ -111,7 +111,7 @@ def write_sources(table: Table, path: str | os.PathLike[str], *, overwrite: bool
         _without_units(table).write(text, format="ascii.csv")
     else:
         QTable(table).write(text, format="ascii.ecsv")
-    with replacing(path, overwrite=overwrite) as file:
+    with replacing(path, SUFFIXES, overwrite=overwrite) as file:
         file.write(text.getvalue().encode())
 
 
@@ -141,9 +141,8 @@ def _checked(table: QTable) -> QTable:
         mask = getattr(column, "mask", None)
         if mask is not None:
             values[np.asarray(mask)] = np.nan
-        given = given or (None if name in ("x", "y") else unit)
-        plain = given is None or given == u.dimensionless_unscaled
-        table[name] = values if plain else values * given
+        given = given or (u.dimensionless_unscaled if name in ("x", "y") else unit)
+        table[name] = values if given == u.dimensionless_unscaled else values * given
     table["kind"] = [str(kind).strip() for kind in table["kind"]]
     return table
 

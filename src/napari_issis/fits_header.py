@@ -63,9 +63,9 @@ def psf_description(psf: PSF) -> str:
     if isinstance(psf, TelescopePSF):
         band = psf.band if isinstance(psf.band, tuple) else (psf.band,)
         return (
-            f"{psf.diameter:g} m aperture, obscuration {psf.obscuration:g}, "
+            f"{psf.diameter:g} m, obscuration {psf.obscuration:g}, "
             f"{'-'.join(f'{wavelength:g}' for wavelength in band)} A, "
-            f"blur FWHM {psf.blur_fwhm:g} arcsec"
+            f"blur {psf.blur_fwhm:g} arcsec FWHM"
         )
     if isinstance(psf, GaussianPSF):
         return f"Gaussian, FWHM {psf.fwhm:g} arcsec"

@@ -63,8 +63,6 @@ def write_exposure(
     OSError
         If the file cannot be written; `FileExistsError` if it exists.
     """
-    if not str(path).lower().endswith(SUFFIXES):
-        raise ValueError(f"{path} is no name for a FITS file; end it with .fits.")
     cards = observation_header(exposure)
     wcs = wcs_header(exposure.observation)
     image = fits.Header([("BUNIT", "ct", "counts per pixel")])
@@ -87,7 +85,7 @@ def write_exposure(
     if isinstance(psf, ImagePSF):
         scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
         hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
-    with replacing(path, overwrite=overwrite) as file:
+    with replacing(path, SUFFIXES, overwrite=overwrite) as file:
         fits.HDUList(hdus).writeto(file, output_verify="exception", checksum=True)
 
 

@@ -12,6 +12,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from .safe_write import replacing
 
+SUFFIXES = (".png",)
 SCALES = ("linear", "log", "sqrt")
 COLORMAPS = ("gray", "gray_r", "heat")
 
@@ -54,8 +55,6 @@ def write_png(
     -----
     Scale, limits and colormap stand in the file as PNG text.
     """
-    if not str(path).lower().endswith(".png"):
-        raise ValueError(f"{path} is no name for a PNG file; end it with .png.")
     values = np.asarray(image, dtype=np.float64)
     if values.ndim != 2 or values.size == 0:
         raise ValueError(f"a PNG shows an image of two dimensions; this one's are {values.shape}.")
@@ -72,7 +71,7 @@ def write_png(
     text.add_text("Limits", f"{low!r} {high!r}")
     text.add_text("Colormap", colormap)
     text.add_text("Orientation", "row 0 at the bottom")
-    with replacing(path, overwrite=overwrite) as file:
+    with replacing(path, SUFFIXES, overwrite=overwrite) as file:
         picture.save(file, format="PNG", pnginfo=text)
 
 

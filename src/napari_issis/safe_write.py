@@ -11,23 +11,31 @@ from pathlib import Path
 from typing import BinaryIO
 
 
-def check_target(path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+def check_target(
+    path: str | os.PathLike[str], endings: tuple[str, ...], *, overwrite: bool = False
+) -> Path:
     """Check that a file may be written, and return its path with symbolic links followed.
 
     Parameters
     ----------
     path : path-like
         The file to be written.
+    endings : tuple of str
+        What its name may end in, such as ``.fits``, in lower case.
     overwrite : bool
         Whether an existing file may be replaced.
 
     Raises
     ------
+    ValueError
+        If the name has another ending.
     FileExistsError
         If the file exists and may not be replaced.
     OSError
         If the path is a directory or its folder does not exist.
     """
+    if not str(path).lower().endswith(endings):
+        raise ValueError(f"cannot write {path}: the name must end in {' or '.join(endings)}.")
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise IsADirectoryError(f"cannot write {path}: it is a directory; give a file name.")
@@ -43,13 +51,17 @@ def check_target(path: str | os.PathLike[str], *, overwrite: bool = False) -> Pa
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[BinaryIO]:
+def replacing(
+    path: str | os.PathLike[str], endings: tuple[str, ...], *, overwrite: bool = False
+) -> Iterator[BinaryIO]:
     """Open a temporary file that takes the target's place once it is complete.
 
     Parameters
     ----------
     path : path-like
         The file to be written.
+    endings : tuple of str
+        What its name may end in, such as ``.fits``, in lower case.
     overwrite : bool
         Whether an existing file may be replaced.
 
@@ -61,11 +73,13 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
 
     Raises
     ------
+    ValueError
+        If the name has another ending.
     OSError
         If the file cannot be written; the message names it. `FileExistsError` if it exists
         and may not be replaced.
     """
-    target = check_target(path, overwrite=overwrite)
+    target = check_target(path, endings, overwrite=overwrite)
     temporary = target.parent / f".napari-issis-{secrets.token_hex(8)}.part"
     try:
         try:
@@ -74,7 +88,7 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
                 file.flush()
                 os.fsync(file.fileno())
             if target.exists():
-                check_target(path, overwrite=overwrite)
+                check_target(path, endings, overwrite=overwrite)
                 shutil.copymode(target, temporary)
             os.replace(temporary, target)
         except BaseException:

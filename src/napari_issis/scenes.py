@@ -97,7 +97,10 @@ Q2237_POINTING = (340.1258, 3.35855)
 
 
 def q2237() -> ExampleScene:
-    """Make the lensed quasar Q2237+0305, the Einstein cross, centred on the lens galaxy."""
+    """Make the lensed quasar Q2237+0305, the Einstein cross: images A, B, C, D, then the lens.
+
+    The lens galaxy is at the frame's centre.
+    """
     shape = (256, 256)
 
     def position(east: float, north: float) -> tuple[float, float]:
@@ -112,12 +115,10 @@ def q2237() -> ExampleScene:
         source("point", *position(*Q2237_IMAGES[name]), flux=Q2237_FLUX[name])
         for name in Q2237_IMAGES
     ]
-    table = vstack([*images, lens])
-    table["name"] = [*Q2237_IMAGES, "G"]
     return ExampleScene(
         "q2237",
         "Lensed quasar Q2237+0305: four images and the lens galaxy",
-        table,
+        vstack([*images, lens]),
         Observation(shape=shape, pointing=SkyCoord(*Q2237_POINTING, unit="deg"), exposure=1000.0),
         "Positions: CASTLES. Illustrative: the quasar's fluxes (F814W magnitudes carried on to "
         "2500 A by a power law lambda^-1.5, without extinction) and the lens galaxy's flux, "
