@@ -1,5 +1,138 @@
-"""PLACEHOLDER for counts."""
-import numpy as np
+"""Poisson noise that is a pure function of the expected counts, the seed and the pixel."""
 
-def poisson_counts(expected, seed):
-    return np.random.default_rng(seed).poisson(expected)
+from __future__ import annotations
+
+from functools import lru_cache
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from .poisson_quantile import poisson_quantile
+
+MAX_EXPECTED = 1e15
+
+
+def poisson_counts(
+    expected: NDArray[np.float64],
+    seed: int,
+    *,
+    previous: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None,
+) -> NDArray[np.int64]:
+    """Draw Poisson counts.
+
+    The counts of a pixel are the smallest k with CDF(k; expected) >= u, u being the pixel's
+    own uniform number (`pixel_uniforms`). Hence they depend on nothing but its expected
+    counts, its position and the seed, and never fall when its expected counts rise.
+
+    Parameters
+    ----------
+    expected : ndarray of float64, shape (ny, nx)
+        Expected counts, from 0 to 1e15.
+    seed : int
+        Seed of the noise, 0 or more.
+    previous : (ndarray, ndarray), optional
+        Expected counts and counts of an earlier call with the same seed and shape. Only the
+        pixels whose expected counts differ are drawn; the result is the same.
+
+    Returns
+    -------
+    ndarray of int64, shape (ny, nx)
+        The counts, exactly Poisson-distributed to the resolution of a 53-bit uniform number.
+
+    Raises
+    ------
+    ValueError
+        If an expected number is negative, not finite or above 1e15, the array is not
+        two-dimensional, the seed is not an integer of 0 or more, or `previous` has
+        another shape.
+    """
+    expected = np.asarray(expected, dtype=np.float64)
+    if expected.ndim != 2:
+        raise ValueError(
+            f"expected has {expected.ndim} dimensions; give an image of shape (ny, nx)."
+        )
+    _check_range(expected)
+    u, z = _uniforms_and_normals(_checked_seed(seed), expected.shape)
+    if previous is None:
+        return poisson_quantile(u.ravel(), expected.ravel(), z.ravel()).reshape(expected.shape)
+    before, counts_before = (np.asarray(a) for a in previous)
+    if before.shape != expected.shape or counts_before.shape != expected.shape:
+        raise ValueError(
+            f"previous has the shapes {before.shape} and {counts_before.shape}; both must be "
+            f"that of expected, {expected.shape}."
+        )
+    changed = expected != before
+    counts = counts_before.astype(np.int64)
+    counts[changed] = poisson_quantile(u[changed], expected[changed], z[changed])
+    return counts
+
+
+def pixel_uniforms(seed: int, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Uniform random numbers of the pixels of a frame.
+
+    Parameters
+    ----------
+    seed : int
+        Seed, 0 or more.
+    shape : (int, int)
+        Frame ``(ny, nx)`` in pixels.
+
+    Returns
+    -------
+    ndarray of float64, shape (ny, nx)
+        Multiples of 2^-53 in (0, 1), with 2^-54 in place of 0; read-only. The number of pixel
+        [y, x] depends on the seed, y and x, not on the shape. The last two frames are kept.
+
+    Raises
+    ------
+    ValueError
+        If the seed is not an integer of 0 or more.
+
+    Notes
+    -----
+    Philox4x64-10 (Salmon et al. 2011, SC'11) with the key that numpy's ``SeedSequence`` makes
+    of the seed; each row has 2^64 counter values of its own.
+    """
+    ny, nx = shape
+    return _uniforms_and_normals(_checked_seed(seed), (int(ny), int(nx)))[0]
+
+
+@lru_cache(maxsize=2)
+def _uniforms_and_normals(
+    seed: int, shape: tuple[int, int]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ny, nx = shape
+    u = np.empty(shape)
+    key = np.random.SeedSequence(seed).generate_state(2, np.uint64)
+    for y in range(ny):
+        bits = np.random.Philox(key=key, counter=[0, y, 0, 0]).random_raw(nx)
+        u[y] = bits >> np.uint64(11)
+    u *= 2.0**-53
+    np.maximum(u, 2.0**-54, out=u)
+    z = ndtri(u)
+    u.flags.writeable = z.flags.writeable = False
+    return u, z
+
+
+def _checked_seed(seed: Any) -> int:
+    if not isinstance(seed, Integral) or seed < 0:
+        raise ValueError(f"seed is {seed!r}; it must be an integer of 0 or more.")
+    return int(seed)
+
+
+def _check_range(expected: NDArray[np.float64]) -> None:
+    if expected.size == 0 or (expected.min() >= 0 and expected.max() <= MAX_EXPECTED):
+        return
+    y, x = np.argwhere(~((expected >= 0) & (expected <= MAX_EXPECTED)))[0]
+    value = float(expected[y, x])
+    if value > MAX_EXPECTED and value != np.inf:
+        raise ValueError(
+            f"pixel [{y}, {x}] expects {value:.4g} counts, more than {MAX_EXPECTED:g}; shorten "
+            "the exposure or make the sources fainter."
+        )
+    raise ValueError(
+        f"pixel [{y}, {x}] expects {value} counts; expected counts must be finite and not negative."
+    )
