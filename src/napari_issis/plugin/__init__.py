@@ -1,0 +1,1 @@
+"""The napari side: layers, widgets and the live scene. It holds no physics."""

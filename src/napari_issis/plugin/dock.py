@@ -1,0 +1,105 @@
+"""The dock widget: instrument, sources, save."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from magicgui.widgets import PushButton
+from napari.utils.notifications import show_error, show_info
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QHideEvent, QShowEvent
+from qtpy.QtWidgets import QFileDialog, QFrame, QGroupBox, QScrollArea, QVBoxLayout, QWidget
+
+from .instrument_form import InstrumentForm
+from .scene import open_scene
+from .source_form import SourceForm
+
+DOCK_NAME = "ISSIS simulator"
+
+
+class SimulatorWidget(QWidget):
+    """Controls of the live scene; makes one in its viewer if there is none.
+
+    Parameters
+    ----------
+    napari_viewer : napari.Viewer
+        The viewer.
+    """
+
+    def __init__(self, napari_viewer: Any) -> None:
+        super().__init__()
+        self.scene = open_scene(viewer=napari_viewer, dock=False)
+        self.instrument = InstrumentForm(self.scene)
+        self.sources = SourceForm(self.scene)
+        self.save = PushButton(
+            text="&Save FITS…", tooltip="Save counts, expected counts and sources as a FITS file"
+        )
+        self.save.changed.connect(self.save_fits)
+        self._following = False
+
+        page = QWidget()
+        column = QVBoxLayout(page)
+        column.setContentsMargins(4, 2, 4, 2)
+        column.setSpacing(4)
+        for title, form in (("Instrument", self.instrument), ("Add sources", self.sources)):
+            box = QGroupBox(title)
+            inner = QVBoxLayout(box)
+            inner.setContentsMargins(2, 2, 2, 2)
+            inner.addWidget(form.native)
+            column.addWidget(box)
+        column.addWidget(self.save.native)
+        column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setWidget(page)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scroll)
+        self.setMinimumWidth(320)
+
+    def save_fits(self, event: Any = None) -> None:
+        """Ask for a file and save the exposure in it; errors are shown."""
+        path = self.ask_path()
+        if path is None:
+            return
+        try:
+            # The dialog has asked before choosing a file that exists.
+            self.scene.exposure.write(path, overwrite=True)
+        except (OSError, ValueError, RuntimeError) as error:
+            show_error(str(error))
+        else:
+            show_info(f"Saved {path}")
+
+    def ask_path(self) -> str | None:
+        """Ask for the file to write; None if the user changed his mind."""
+        dialog = QFileDialog(self, "Save exposure", "issis.fits", "FITS (*.fits)")
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix("fits")
+        return dialog.selectedFiles()[0] if dialog.exec() else None
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Follow the scene while visible (napari gives docked widgets no close event)."""
+        if not self._following:
+            self._following = True
+            self.instrument.resume()
+        super().showEvent(event)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Cost nothing while hidden."""
+        if self._following:
+            self._following = False
+            self.instrument.pause()
+        super().hideEvent(event)
+
+
+def dock_simulator(viewer: Any) -> None:
+    """Dock the widget at the right of the viewer, unless it is there already."""
+    if DOCK_NAME in " ".join(viewer.window.dock_widgets):
+        return
+    try:
+        viewer.window.add_plugin_dock_widget("napari-issis", DOCK_NAME)
+    except (KeyError, ValueError):
+        # The plugin is switched off in napari's plugin manager.
+        viewer.window.add_dock_widget(SimulatorWidget(viewer), name=DOCK_NAME, area="right")

@@ -1,0 +1,288 @@
+"""A napari layer as the editor of one part of the source table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from astropy.table import QTable
+from napari.layers import Points, Shapes
+from numpy.typing import NDArray
+
+from . import layer_styles as styles
+from .layers import (
+    FEATURES,
+    adopt_features,
+    adopt_points,
+    adopt_shapes,
+    features,
+    points_data,
+    same_ellipses,
+    shapes_data,
+)
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.int64]
+
+MARKER = "napari_issis"
+
+
+class SourceLayer:
+    """Keeps a layer and its rows of the source table in step.
+
+    Attributes
+    ----------
+    layer : napari layer or None
+        None where the user deleted it or it was not needed yet.
+    source_id : ndarray of int
+        Ids of the rows that the layer held when the two were last in step.
+    """
+
+    role = ""
+
+    def __init__(self, layer: Any = None) -> None:
+        self.layer = layer
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget what was written, as after the deletion of the layer."""
+        self.source_id: Ids = np.empty(0, dtype=np.int64)
+        self._geometry: Array = self.geometry(QTable(), empty=True)
+        self._features = pd.DataFrame(columns=[*FEATURES, "source_id"])
+
+    def holds(self, kinds: Any) -> NDArray[np.bool_]:
+        """Tell which kinds of sources belong on the layer."""
+        raise NotImplementedError
+
+    def geometry(self, table: QTable, *, empty: bool = False) -> Array:
+        """Layer data of a table."""
+        raise NotImplementedError
+
+    def read(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Layer data as they are now, and which rows can be sources."""
+        raise NotImplementedError
+
+    def moved(self, table: QTable, written: Array, current: Array) -> QTable:
+        """Return the table with the changes of geometry."""
+        raise NotImplementedError
+
+    def same(self, first: Array, second: Array) -> bool:
+        """Whether two sets of layer data show the same sources."""
+        raise NotImplementedError
+
+    def make(self) -> Any:
+        """Create an empty layer."""
+        raise NotImplementedError
+
+    def replace(self, data: Array, table: QTable) -> None:
+        """Put data into the layer, whatever it held."""
+        raise NotImplementedError
+
+    def changed(self) -> bool:
+        """Whether the layer holds other sources than when last in step (cheap)."""
+        if self.layer is None:
+            return len(self.source_id) > 0
+        data, usable = self.read()
+        return not (
+            usable.all()
+            and data.shape == self._geometry.shape
+            and np.array_equal(data, self._geometry)
+            and len(self.layer.features) == len(self._features)
+            and self.layer.features.reindex(columns=self._features.columns).equals(self._features)
+        )
+
+    def current_ids(self) -> Ids:
+        """Ids of the layer's rows; -1 where a row has none."""
+        table = self.layer.features
+        if "source_id" not in table.columns:
+            return np.full(len(table), -1, dtype=np.int64)
+        ids = pd.to_numeric(table["source_id"], errors="coerce").fillna(-1)
+        return ids.to_numpy().astype(np.int64)
+
+    def write(self, table: QTable, source_id: Ids) -> None:
+        """Show the rows of the table that belong here."""
+        mine = self.holds(table["kind"])
+        part, ids = table[mine], source_id[mine]
+        if self.layer is None:
+            if len(part) == 0:
+                return
+            self.layer = self.make()
+        selected = set(self.current_ids()[list(self.layer.selected_data)])
+        self.replace(self.geometry(part), part)
+        self.layer.features = features(part, ids)
+        self.layer.selected_data = {
+            int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
+        }
+        self.in_step(part, ids)
+
+    def in_step(self, part: QTable, source_id: Ids) -> None:
+        """Note what the layer holds now, and the features of these rows in the layer."""
+        self.source_id = source_id
+        self._features = features(part, source_id)
+        self._geometry = self.read()[0].copy()
+        table = self.layer.features
+        for name in self._features.columns:
+            # Setting a column in place emits nothing.
+            table[name] = self._features[name].to_numpy()
+
+    def shows(self, table: QTable) -> bool:
+        """Whether the layer shows these rows, which are its own, as the table has them."""
+        data, usable = self.read()
+        return bool(usable.all()) and self.same(data, self.geometry(table))
+
+    def stale(self, table: QTable) -> bool:
+        """Whether the features of the layer lag behind these rows, which are its own."""
+        return not features(table, self.source_id).equals(self._features)
+
+    def survivors(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        """Match the layer's rows to those last in step.
+
+        Returns
+        -------
+        rows : ndarray of int
+            Rows of the layer that were there before.
+        before : ndarray of int
+            Their places in ``source_id``.
+        fresh : ndarray of int
+            Rows that are new: drawn, pasted or cloned (their id is unknown or repeated).
+        """
+        _, usable = self.read()
+        known = {int(value): place for place, value in enumerate(self.source_id)}
+        rows, before, fresh = [], [], []
+        for row, value in enumerate(self.current_ids().tolist()):
+            if not usable[row]:
+                continue
+            place = known.pop(value, None)
+            if place is None:
+                fresh.append(row)
+            else:
+                rows.append(row)
+                before.append(place)
+        return tuple(np.array(v, dtype=np.intp) for v in (rows, before, fresh))  # type: ignore[return-value]
+
+    def adopt(
+        self, table: QTable, rows: NDArray[np.intp], before: NDArray[np.intp]
+    ) -> QTable:
+        """Return surviving rows of the table with what changed in the layer."""
+        data, _ = self.read()
+        current = self.layer.features.iloc[rows].reset_index(drop=True)
+        written = self._features.iloc[before].reset_index(drop=True)
+        if not current.reindex(columns=written.columns).equals(written):
+            table = adopt_features(table, written, current)
+        return self.moved(table, self._geometry[before], data[rows])
+
+    def adopt_geometry(self, table: QTable) -> None:
+        """Note the geometry as it is now, without touching the layer (during a drag)."""
+        data, usable = self.read()
+        if usable.all() and data.shape == self._geometry.shape:
+            self._geometry = data.copy()
+
+
+class PointsLayer(SourceLayer):
+    """Point sources as stars."""
+
+    role = "points"
+
+    def holds(self, kinds: Any) -> NDArray[np.bool_]:
+        """Points only."""
+        return np.asarray(kinds, dtype=str) == "point"
+
+    def geometry(self, table: QTable, *, empty: bool = False) -> Array:
+        """Positions."""
+        return np.empty((0, 2)) if empty else points_data(table)
+
+    def read(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Positions now."""
+        data = np.asarray(self.layer.data, dtype=np.float64)
+        return data, np.ones(len(data), dtype=bool)
+
+    def moved(self, table: QTable, written: Array, current: Array) -> QTable:
+        """Return the table with the points that moved."""
+        return adopt_points(table, written, current)
+
+    def same(self, first: Array, second: Array) -> bool:
+        """Exactly the same positions, kept as floats (integers would be dragged in steps)."""
+        return np.array_equal(first, second) and self.layer.data.dtype == np.float64
+
+    def make(self) -> Points:
+        """Create an empty layer."""
+        return Points(
+            np.empty((0, 2)),
+            features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
+            metadata={MARKER: {"role": self.role}},
+            **styles.POINTS,
+        )
+
+    def replace(self, data: Array, table: QTable) -> None:
+        """Put positions into the layer."""
+        self.layer.selected_data = set()
+        self.layer.data = data
+
+
+class EllipsesLayer(SourceLayer):
+    """Extended sources as the ellipses that hold half of their light."""
+
+    role = "ellipses"
+
+    def holds(self, kinds: Any) -> NDArray[np.bool_]:
+        """All but points."""
+        return np.asarray(kinds, dtype=str) != "point"
+
+    def geometry(self, table: QTable, *, empty: bool = False) -> Array:
+        """Corners of the half-light isophotes."""
+        return np.empty((0, 4, 2)) if empty else shapes_data(table)
+
+    def read(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Corners now; other shapes than ellipses are no sources."""
+        usable = np.array([kind == "ellipse" for kind in self.layer.shape_type], dtype=bool)
+        data = np.full((len(usable), 4, 2), np.nan)
+        for row, corners in enumerate(self.layer.data):
+            if usable[row]:
+                data[row] = corners
+        return data, usable
+
+    def moved(self, table: QTable, written: Array, current: Array) -> QTable:
+        """Return the table with the ellipses that changed."""
+        return adopt_shapes(table, written, current)
+
+    def same(self, first: Array, second: Array) -> bool:
+        """Same ellipses, whatever corner comes first."""
+        return same_ellipses(first, second)
+
+    def make(self) -> Shapes:
+        """Create an empty layer."""
+        return Shapes(
+            None,
+            ndim=2,
+            features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
+            metadata={MARKER: {"role": self.role}},
+            **styles.ELLIPSES,
+        )
+
+    def replace(self, data: Array, table: QTable) -> None:
+        """Put ellipses into the layer."""
+        self.layer.selected_data = set()
+        self.layer.data = [(corners, "ellipse") for corners in data]
+        if len(data):
+            self.layer.edge_color = styles.edge_colors(table["kind"])
+            self.layer.edge_width = [styles.ELLIPSES["edge_width"]] * len(data)
+
+    def recolor(self, kinds: Iterable[str]) -> None:
+        """Give each ellipse the colour of its kind."""
+        colors = styles.edge_colors(kinds)
+        if colors:
+            self.layer.edge_color = colors
+
+    def refuse(self) -> int:
+        """Remove shapes that are no ellipses; return how many there were."""
+        _, usable = self.read()
+        wrong = [int(row) for row in np.flatnonzero(~usable)]
+        if wrong:
+            self.layer.remove(wrong)
+        return len(wrong)
+
+
+def _no_rows() -> dict[str, Any]:
+    return {"kind": np.empty(0, dtype="U13"), "x": [], "y": [], "flux": []}

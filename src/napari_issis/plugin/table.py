@@ -1,0 +1,89 @@
+"""The master source table of a scene: float64, in pixels and degrees, rows can be joined."""
+
+from __future__ import annotations
+
+import numpy as np
+from astropy import units as u
+from astropy.table import QTable, Table, vstack
+
+from ..sources import FLUX_UNIT, check_sources
+
+STRUCTURE_UNITS = {"r_half": u.pix, "ellipticity": None, "pa": u.deg}
+
+
+def master_table(table: Table) -> QTable:
+    """Return a checked copy of a source table that can be edited cell by cell.
+
+    Positions, radii and angles become float64 in pixels and degrees; the flux keeps its unit
+    (AB magnitudes included). Columns of the structure that a table of points lacks are
+    filled with NaN. Further columns are kept.
+
+    Raises
+    ------
+    ValueError
+        If the table is not a source table; the message names row, column and value.
+    """
+    arrays = check_sources(table)
+    master = QTable(table, copy=True)
+    extended = arrays.kind != "point"
+    width = max([13, *(len(kind) for kind in arrays.kind)])
+    master["kind"] = arrays.kind.astype(f"U{width}")
+    master["x"], master["y"] = arrays.x, arrays.y
+    flux = table["flux"]
+    unit = getattr(flux, "unit", None) or FLUX_UNIT
+    master["flux"] = np.array(getattr(flux, "value", flux), dtype=np.float64) * unit
+    for name, unit in STRUCTURE_UNITS.items():
+        values = np.where(extended, getattr(arrays, name), _plain(table, name, unit))
+        master[name] = values if unit is None else values * unit
+    if "n" in table.colnames:
+        sersic = arrays.kind == "sersic"
+        master["n"] = np.where(sersic, arrays.index, _plain(table, "n", None))
+    return master
+
+
+def join(first: QTable, second: QTable, *, pivot: float) -> QTable:
+    """Append the rows of one master table to another.
+
+    The flux of the second is converted to the unit of the first at the wavelength ``pivot``
+    (angstrom) where they differ.
+
+    Raises
+    ------
+    ValueError
+        If a flux of zero would have to become a magnitude.
+    """
+    if len(first) == 0:
+        return second.copy()
+    if len(second) == 0:
+        return first.copy()
+    first, second = first.copy(), second.copy()
+    unit = first["flux"].unit
+    if second["flux"].unit != unit:
+        with np.errstate(divide="ignore"):
+            flux = second["flux"].to(unit, u.spectral_density(pivot * u.AA))
+        if not np.all(np.isfinite(flux.value)):
+            raise ValueError(
+                f"the sources of this scene are in {unit}, in which a flux of 0 has no value; "
+                "give a flux above 0."
+            )
+        second["flux"] = flux
+    for one, other in ((first, second), (second, first)):
+        if "n" in other.colnames and "n" not in one.colnames:
+            one["n"] = np.full(len(one), np.nan)
+    return vstack([first, second], metadata_conflicts="silent")
+
+
+def _plain(table: Table, name: str, unit: u.UnitBase | None) -> np.ndarray:
+    """Values of a column that need not be valid (NaN where they are no plain numbers)."""
+    nothing = np.full(len(table), np.nan)
+    if name not in table.colnames:
+        return nothing
+    column = table[name]
+    mask = np.asarray(getattr(column, "mask", False))
+    try:
+        if unit is not None and getattr(column, "unit", None) is not None:
+            column = u.Quantity(column).to(unit)
+        values = np.array(getattr(column, "value", column), dtype=np.float64)
+    except (TypeError, ValueError, u.UnitConversionError):
+        return nothing
+    return np.where(mask, np.nan, values)
