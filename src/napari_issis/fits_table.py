@@ -99,7 +99,7 @@ def table_hdu(table: Table, name: str) -> fits.BinTableHDU:
         hdu = fits.table_to_hdu(plain)
     except UnicodeEncodeError as error:
         raise ValueError(
-            f"the table holds the text {error.object!r}; FITS tables take ASCII text only."
+            f"the table holds the text {str(error.object)!r}; FITS tables take ASCII text only."
         ) from error
     for column in table.colnames:
         unit = getattr(table[column], "unit", None)

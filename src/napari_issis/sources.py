@@ -229,7 +229,8 @@ def check_sources(
         )
     kind = np.array([str(k).strip() for k in table["kind"]], dtype="U32")
     for row in np.flatnonzero(~np.isin(kind, KINDS)):
-        raise ValueError(f"row {row}, kind: {kind[row]!r} is unknown; known: {', '.join(KINDS)}.")
+        name = str(kind[row])
+        raise ValueError(f"row {row}, kind: {name!r} is unknown; known: {', '.join(KINDS)}.")
     extended = kind != "point"
     if extended.any():
         missing = [name for name in COLUMNS[4:] if name not in table.colnames]
@@ -307,7 +308,7 @@ def _column(
     for row in np.flatnonzero(used & mask):
         raise ValueError(f"row {row}, {name}: the value is missing.")
     given = getattr(column, "unit", None)
-    plain = getattr(column, "filled", lambda _: column)(np.nan) if mask.any() else column
+    plain = column.astype(float).filled(np.nan) if mask.any() else column
     try:
         if given is None or given == unit:
             values = np.asarray(getattr(plain, "value", plain), dtype=float)
@@ -330,7 +331,7 @@ def _column(
                 float(column[row])
             except (TypeError, ValueError):
                 raise ValueError(
-                    f"row {row}, {name}: {column[row]!r} is not a number."
+                    f"row {row}, {name}: {str(column[row])!r} is not a number."
                 ) from None
         raise
     values = np.array(values, dtype=np.float64).reshape(len(table))
