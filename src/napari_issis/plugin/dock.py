@@ -8,7 +8,7 @@ from magicgui.widgets import PushButton
 from napari.utils.notifications import show_error, show_info
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QHideEvent, QShowEvent
-from qtpy.QtWidgets import QFileDialog, QFrame, QGroupBox, QScrollArea, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QFileDialog, QFrame, QScrollArea, QVBoxLayout, QWidget
 
 from .instrument_form import InstrumentForm
 from .scene import open_scene
@@ -17,7 +17,7 @@ from .source_form import SourceForm
 DOCK_NAME = "ISSIS simulator"
 
 
-class SimulatorWidget(QWidget):
+class SimulatorWidget(QWidget):  # type: ignore[misc]
     """Controls of the live scene; makes one in its viewer if there is none.
 
     Parameters
@@ -41,13 +41,8 @@ class SimulatorWidget(QWidget):
         column = QVBoxLayout(page)
         column.setContentsMargins(4, 2, 4, 2)
         column.setSpacing(4)
-        for title, form in (("Instrument", self.instrument), ("Add sources", self.sources)):
-            box = QGroupBox(title)
-            inner = QVBoxLayout(box)
-            inner.setContentsMargins(2, 2, 2, 2)
-            inner.addWidget(form.native)
-            column.addWidget(box)
-        column.addWidget(self.save.native)
+        column.addWidget(self.instrument)
+        column.addWidget(self.sources)
         column.addStretch(1)
         scroll = QScrollArea()
         scroll.setWidgetResizable(True)
@@ -55,9 +50,10 @@ class SimulatorWidget(QWidget):
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         scroll.setWidget(page)
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setContentsMargins(0, 0, 0, 4)
         layout.addWidget(scroll)
-        self.setMinimumWidth(320)
+        layout.addWidget(self.save.native)
+        self.setMinimumWidth(330)
 
     def save_fits(self, event: Any = None) -> None:
         """Ask for a file and save the exposure in it; errors are shown."""

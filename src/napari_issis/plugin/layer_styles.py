@@ -22,11 +22,12 @@ GEOMETRY: dict[str, Any] = {
 POINTS: dict[str, Any] = {
     "name": "ISSIS point sources",
     "symbol": "star",
-    "size": 10.0,
-    "face_color": [1.0, 0.0, 0.0, 0.25],
+    "size": 9.0,
+    "face_color": "transparent",
     "border_color": "red",
-    "border_width": 0.09,
-    "canvas_size_limits": (8, 18),
+    "border_width": 0.06,
+    # Pixels on the screen: when zoomed in, the marker does not hide the star.
+    "canvas_size_limits": (6, 16),
     "out_of_slice_display": False,
     **GEOMETRY,
 }
@@ -37,14 +38,16 @@ ELLIPSES: dict[str, Any] = {
     "edge_width": 0.8,
     **GEOMETRY,
 }
+FRAME_COLOR = "#7a7f88"
 COUNTS: dict[str, Any] = {
     "name": "ISSIS counts",
     "colormap": "gray",
     "interpolation2d": "nearest",
+    "gamma": 0.5,
     **GEOMETRY,
 }
 
 
 def edge_colors(kinds: Iterable[str]) -> list[str]:
-    """Return the colour of the ellipse of each kind."""
-    return [ELLIPSE_COLORS[str(kind)] for kind in kinds]
+    """Return the colour of the ellipse of each kind (white for none)."""
+    return [ELLIPSE_COLORS.get(str(kind), "white") for kind in kinds]

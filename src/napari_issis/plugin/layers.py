@@ -41,11 +41,12 @@ def shapes_data(table: QTable) -> Array:
     minor = (s.r_half * (1 - s.ellipticity))[:, None] * np.column_stack([np.sin(pa), np.cos(pa)])
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
     centre = np.column_stack([s.y, s.x])
-    return (
+    corners: Array = (
         centre[:, None, :]
         + signs[None, :, :1] * major[:, None, :]
         + signs[None, :, 1:] * minor[:, None, :]
     )
+    return corners
 
 
 def ellipses(corners: Array) -> tuple[Array, Array, Array]:

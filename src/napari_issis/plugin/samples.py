@@ -15,8 +15,8 @@ from ..scenes import example_scene
 from . import layer_styles as styles
 from .contrast import contrast_limits
 from .layers import features, points_data, shapes_data
+from .marks import MARKER
 from .scene import marked_layers, open_scene, scene_of
-from .source_layers import MARKER
 from .table import master_table
 
 

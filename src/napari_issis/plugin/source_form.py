@@ -7,14 +7,13 @@ from typing import Any
 from astropy.table import QTable
 from magicgui.widgets import (
     ComboBox,
-    Container,
     FloatSpinBox,
     LineEdit,
     PushButton,
-    RadioButtons,
     SpinBox,
 )
 from napari.utils.notifications import show_error
+from qtpy.QtWidgets import QWidget
 
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -25,6 +24,7 @@ from ..sources import (
     random_sources,
     source,
 )
+from .form import Form
 from .scene import Scene
 
 KIND_TEXT = {
@@ -34,33 +34,31 @@ KIND_TEXT = {
     "sersic": "Sérsic",
 }
 FLUX_LABEL = "F (erg/s/cm²/Å)"
-FLUX_HELP = "Flux in erg s⁻¹ cm⁻² Å⁻¹, averaged over the channel"
+FLUX_HELP = "Flux F in erg s⁻¹ cm⁻² Å⁻¹, averaged over the channel"
 R_HELP = "Semi-major axis of the ellipse that holds half of the light, pixels (0.036″ each)"
 E_HELP = "Ellipticity 1 − b/a, from 0 to below 1"
 PA_HELP = "Position angle of the major axis, degrees from up, counter-clockwise"
 N_HELP = "Sérsic index, 0.5 to 8"
 
 
-class Limits(Container[Any]):
+class Limits:
     """Lower and upper limit of a quantity, typed as numbers."""
 
-    def __init__(self, label: str, low: float, high: float, tooltip: str) -> None:
+    def __init__(self, name: str, low: float, high: float, tooltip: str) -> None:
+        self.name = name
         self.low = LineEdit(value=f"{low:g}", tooltip=f"Lower limit. {tooltip}")
         self.high = LineEdit(value=f"{high:g}", tooltip=f"Upper limit. {tooltip}")
-        super().__init__(
-            widgets=[self.low, self.high], layout="horizontal", labels=False, label=label
-        )
-        self.margins = (0, 0, 0, 0)
 
     @property
     def numbers(self) -> tuple[float, float]:
         """The limits."""
-        return number(f"{self.label}, lower limit", self.low.value), number(
-            f"{self.label}, upper limit", self.high.value
+        return (
+            number(f"{self.name}, lower limit", self.low.value),
+            number(f"{self.name}, upper limit", self.high.value),
         )
 
 
-class SourceForm(Container[Any]):
+class SourceForm(Form):
     """Adds sources to the scene, and says what sources drawn by hand are.
 
     Parameters
@@ -70,80 +68,78 @@ class SourceForm(Container[Any]):
     """
 
     def __init__(self, scene: Scene) -> None:
+        super().__init__("Add sources")
         self.scene = scene
         self.kind = ComboBox(
-            label="kind",
             choices=[(KIND_TEXT.get(kind, kind), kind) for kind in KINDS],
             value="exponential",
             tooltip="Profile; also that of ellipses drawn by hand",
         )
-        self.mode = RadioButtons(
-            label="",
-            choices=["specific", "random"],
+        self.mode = ComboBox(
+            choices=[("specific object", "specific"), ("random distribution", "random")],
             value="specific",
-            orientation="horizontal",
             tooltip="One source with these parameters, or a random population over the frame",
         )
-        self.x = _real("x", 256.0, -1e6, 1e6, "Column of the centre, pixels (first pixel: 0)")
-        self.y = _real("y", 256.0, -1e6, 1e6, "Row of the centre, pixels (first pixel: 0)")
-        self.position = Container(
-            widgets=[self.x, self.y], layout="horizontal", labels=False, label="x, y (px)"
-        )
-        self.position.margins = (0, 0, 0, 0)
-        self.flux = LineEdit(label=FLUX_LABEL, value=f"{DEFAULT_FLUX:g}", tooltip=FLUX_HELP)
-        self.r_half = _real("R½ (px)", DEFAULT_R_HALF, 0.01, 1e5, R_HELP)
-        self.ellipticity = _real("ellipticity", DEFAULT_ELLIPTICITY, 0.0, 0.99, E_HELP, 0.05)
-        self.pa = _real("PA (°)", DEFAULT_PA, -360.0, 360.0, PA_HELP, 5.0)
-        self.n = _real("Sérsic n", 2.0, 0.5, 8.0, N_HELP, 0.5)
+        self.x = _real(256.0, -1e6, 1e6, "x, column of the centre, pixels (first pixel: 0)")
+        self.y = _real(256.0, -1e6, 1e6, "y, row of the centre, pixels (first pixel: 0)")
+        self.flux = LineEdit(value=f"{DEFAULT_FLUX:g}", tooltip=FLUX_HELP)
+        self.r_half = _real(DEFAULT_R_HALF, 0.01, 1e5, R_HELP)
+        self.ellipticity = _real(DEFAULT_ELLIPTICITY, 0.0, 0.99, E_HELP, 0.05)
+        self.pa = _real(DEFAULT_PA, -360.0, 360.0, PA_HELP, 5.0)
+        self.n = _real(2.0, 0.5, 8.0, N_HELP, 0.5)
 
-        self.number = ComboBox(
-            label="number", choices=[1, 10, 100], value=100, tooltip="Number of sources"
-        )
-        self.flux_limits = Limits(FLUX_LABEL, 1e-15, 1e-14, FLUX_HELP)
+        self.number = ComboBox(choices=[1, 10, 100], value=100, tooltip="Number of sources")
         self.distribution = ComboBox(
-            label="F spread",
             choices=[("uniform", "uniform"), ("log-uniform", "log")],
             tooltip="Uniform in flux or in its logarithm",
         )
-        self.r_limits = Limits("R½ (px)", 10, 30, R_HELP)
+        self.flux_limits = Limits("flux", 1e-15, 1e-14, FLUX_HELP)
+        self.r_limits = Limits("half-light radius", 10, 30, R_HELP)
         self.e_limits = Limits("ellipticity", 0, 0.8, E_HELP)
-        self.pa_limits = Limits("PA (°)", 0, 180, PA_HELP)
-        self.n_limits = Limits("Sérsic n", 0.5, 4, N_HELP)
+        self.pa_limits = Limits("position angle", 0, 180, PA_HELP)
+        self.n_limits = Limits("Sersic index", 0.5, 4, N_HELP)
         self.seed = SpinBox(
-            label="seed",
             min=0,
             max=2**31 - 1,
             value=1,
             tooltip="Seed of the population; goes up by one with each, so that none is repeated",
         )
         self.button = PushButton(text="&Add source(s)", tooltip="Add to the scene")
-        self._specific = [
-            self.position,
-            self.flux,
-            self.r_half,
-            self.ellipticity,
-            self.pa,
-            self.n,
+
+        self.add("Kind", self.kind)
+        self.add("Mode", self.mode)
+        self._specific = [self.add("x, y (px)", self.x, self.y), self.add(FLUX_LABEL, self.flux)]
+        structure = [
+            self.add("R½ (px)", self.r_half),
+            self.add("Ellipticity", self.ellipticity),
+            self.add("PA (°)", self.pa),
         ]
+        index = [self.add("Sérsic n", self.n)]
+        self._specific += structure + index
         self._random = [
-            self.number,
-            self.flux_limits,
-            self.distribution,
-            self.r_limits,
-            self.e_limits,
-            self.pa_limits,
-            self.n_limits,
-            self.seed,
+            self.add("Number, F is", self.number, self.distribution),
+            self._add_limits(FLUX_LABEL, self.flux_limits),
         ]
-        super().__init__(
-            widgets=[self.kind, self.mode, *self._specific, *self._random, self.button]
-        )
-        self.margins = (4, 2, 4, 2)
-        self.mode.changed.connect(self._show_fields)
-        self.kind.changed.connect(self._show_fields)
-        self.changed.connect(self._describe_drawn)
-        self.button.changed.connect(self.add)
+        limits = [
+            self._add_limits("R½ (px)", self.r_limits),
+            self._add_limits("Ellipticity", self.e_limits),
+            self._add_limits("PA (°)", self.pa_limits),
+        ]
+        index_limits = [self._add_limits("Sérsic n", self.n_limits)]
+        self._random += [*limits, *index_limits, self.add("Seed", self.seed)]
+        self._structure = structure + limits
+        self._index = index + index_limits
+        self.add("", self.button)
+
+        for widget in (self.mode, self.kind):
+            widget.changed.connect(self._show_fields)
+        for field in (self.flux, self.r_half, self.ellipticity, self.pa, self.n):
+            field.changed.connect(self._describe_drawn)
+        self.button.changed.connect(self.add_sources)
         self._show_fields()
+
+    def _add_limits(self, label: str, limits: Limits) -> QWidget:
+        return self.add(label, limits.low, limits.high)
 
     def table(self) -> QTable:
         """Return the sources that the form describes.
@@ -175,7 +171,7 @@ class SourceForm(Container[Any]):
             **ranges,
         )
 
-    def add(self, event: Any = None) -> None:
+    def add_sources(self, event: Any = None) -> None:
         """Add the sources; an error is shown and changes nothing."""
         try:
             self.scene.add(self.table())
@@ -207,21 +203,14 @@ class SourceForm(Container[Any]):
 
     def _show_fields(self, event: Any = None) -> None:
         specific = self.mode.value == "specific"
-        for widget in self._specific:
-            widget.visible = specific
-        for widget in self._random:
-            widget.visible = not specific
-        extended, sersic = self.kind.value != "point", self.kind.value == "sersic"
-        for widget in (
-            self.r_half,
-            self.ellipticity,
-            self.pa,
-            self.r_limits,
-            self.e_limits,
-            self.pa_limits,
-        ):
-            widget.enabled = extended
-        self.n.enabled = self.n_limits.enabled = sersic
+        for row in self._specific:
+            self.show_row(row, specific)
+        for row in self._random:
+            self.show_row(row, not specific)
+        for row in self._structure:
+            self.enable_row(row, self.kind.value != "point")
+        for row in self._index:
+            self.enable_row(row, self.kind.value == "sersic")
         self._describe_drawn()
 
 
@@ -239,7 +228,5 @@ def number(name: str, text: str) -> float:
         raise ValueError(f"{name} is {text!r}; it must be a number such as 1e-14.") from None
 
 
-def _real(
-    label: str, value: float, low: float, high: float, tooltip: str, step: float = 1.0
-) -> FloatSpinBox:
-    return FloatSpinBox(label=label, value=value, min=low, max=high, step=step, tooltip=tooltip)
+def _real(value: float, low: float, high: float, tooltip: str, step: float = 1.0) -> FloatSpinBox:
+    return FloatSpinBox(value=value, min=low, max=high, step=step, tooltip=tooltip)

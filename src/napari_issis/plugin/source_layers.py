@@ -22,11 +22,10 @@ from .layers import (
     same_ellipses,
     shapes_data,
 )
+from .marks import MARKER
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
-
-MARKER = "napari_issis"
 
 
 class SourceLayer:
@@ -60,9 +59,13 @@ class SourceLayer:
         """Layer data of a table."""
         raise NotImplementedError
 
-    def read(self) -> tuple[Array, NDArray[np.bool_]]:
-        """Layer data as they are now, and which rows can be sources."""
+    def read(self) -> Array:
+        """Layer data as they are now."""
         raise NotImplementedError
+
+    def foreign(self) -> list[int]:
+        """Rows of the layer that cannot be sources."""
+        return []
 
     def moved(self, table: QTable, written: Array, current: Array) -> QTable:
         """Return the table with the changes of geometry."""
@@ -84,10 +87,9 @@ class SourceLayer:
         """Whether the layer holds other sources than when last in step (cheap)."""
         if self.layer is None:
             return len(self.source_id) > 0
-        data, usable = self.read()
+        data = self.read()
         return not (
-            usable.all()
-            and data.shape == self._geometry.shape
+            data.shape == self._geometry.shape
             and np.array_equal(data, self._geometry)
             and len(self.layer.features) == len(self._features)
             and self.layer.features.reindex(columns=self._features.columns).equals(self._features)
@@ -99,7 +101,7 @@ class SourceLayer:
         if "source_id" not in table.columns:
             return np.full(len(table), -1, dtype=np.int64)
         ids = pd.to_numeric(table["source_id"], errors="coerce").fillna(-1)
-        return ids.to_numpy().astype(np.int64)
+        return np.array(ids, dtype=np.int64)
 
     def write(self, table: QTable, source_id: Ids) -> None:
         """Show the rows of the table that belong here."""
@@ -121,7 +123,7 @@ class SourceLayer:
         """Note what the layer holds now, and the features of these rows in the layer."""
         self.source_id = source_id
         self._features = features(part, source_id)
-        self._geometry = self.read()[0].copy()
+        self._geometry = self.read().copy()
         table = self.layer.features
         for name in self._features.columns:
             # Setting a column in place emits nothing.
@@ -129,8 +131,7 @@ class SourceLayer:
 
     def shows(self, table: QTable) -> bool:
         """Whether the layer shows these rows, which are its own, as the table has them."""
-        data, usable = self.read()
-        return bool(usable.all()) and self.same(data, self.geometry(table))
+        return self.same(self.read(), self.geometry(table))
 
     def stale(self, table: QTable) -> bool:
         """Whether the features of the layer lag behind these rows, which are its own."""
@@ -148,12 +149,9 @@ class SourceLayer:
         fresh : ndarray of int
             Rows that are new: drawn, pasted or cloned (their id is unknown or repeated).
         """
-        _, usable = self.read()
         known = {int(value): place for place, value in enumerate(self.source_id)}
         rows, before, fresh = [], [], []
         for row, value in enumerate(self.current_ids().tolist()):
-            if not usable[row]:
-                continue
             place = known.pop(value, None)
             if place is None:
                 fresh.append(row)
@@ -162,22 +160,17 @@ class SourceLayer:
                 before.append(place)
         return tuple(np.array(v, dtype=np.intp) for v in (rows, before, fresh))  # type: ignore[return-value]
 
-    def adopt(
-        self, table: QTable, rows: NDArray[np.intp], before: NDArray[np.intp]
-    ) -> QTable:
+    def adopt(self, table: QTable, rows: NDArray[np.intp], before: NDArray[np.intp]) -> QTable:
         """Return surviving rows of the table with what changed in the layer."""
-        data, _ = self.read()
         current = self.layer.features.iloc[rows].reset_index(drop=True)
         written = self._features.iloc[before].reset_index(drop=True)
         if not current.reindex(columns=written.columns).equals(written):
             table = adopt_features(table, written, current)
-        return self.moved(table, self._geometry[before], data[rows])
+        return self.moved(table, self._geometry[before], self.read()[rows])
 
-    def adopt_geometry(self, table: QTable) -> None:
+    def note_geometry(self) -> None:
         """Note the geometry as it is now, without touching the layer (during a drag)."""
-        data, usable = self.read()
-        if usable.all() and data.shape == self._geometry.shape:
-            self._geometry = data.copy()
+        self._geometry = self.read().copy()
 
 
 class PointsLayer(SourceLayer):
@@ -187,23 +180,22 @@ class PointsLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Points only."""
-        return np.asarray(kinds, dtype=str) == "point"
+        return np.array([kind == "point" for kind in kinds], dtype=bool)
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Positions."""
         return np.empty((0, 2)) if empty else points_data(table)
 
-    def read(self) -> tuple[Array, NDArray[np.bool_]]:
+    def read(self) -> Array:
         """Positions now."""
-        data = np.asarray(self.layer.data, dtype=np.float64)
-        return data, np.ones(len(data), dtype=bool)
+        return np.asarray(self.layer.data, dtype=np.float64)
 
     def moved(self, table: QTable, written: Array, current: Array) -> QTable:
         """Return the table with the points that moved."""
         return adopt_points(table, written, current)
 
     def same(self, first: Array, second: Array) -> bool:
-        """Exactly the same positions, kept as floats (integers would be dragged in steps)."""
+        """Tell whether the positions are the same, and floats (integers move in steps)."""
         return np.array_equal(first, second) and self.layer.data.dtype == np.float64
 
     def make(self) -> Points:
@@ -228,27 +220,27 @@ class EllipsesLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """All but points."""
-        return np.asarray(kinds, dtype=str) != "point"
+        return np.array([kind != "point" for kind in kinds], dtype=bool)
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Corners of the half-light isophotes."""
         return np.empty((0, 4, 2)) if empty else shapes_data(table)
 
-    def read(self) -> tuple[Array, NDArray[np.bool_]]:
-        """Corners now; other shapes than ellipses are no sources."""
-        usable = np.array([kind == "ellipse" for kind in self.layer.shape_type], dtype=bool)
-        data = np.full((len(usable), 4, 2), np.nan)
-        for row, corners in enumerate(self.layer.data):
-            if usable[row]:
-                data[row] = corners
-        return data, usable
+    def read(self) -> Array:
+        """Corners now."""
+        corners = self.layer.data
+        return np.array(corners, dtype=np.float64) if len(corners) else np.empty((0, 4, 2))
+
+    def foreign(self) -> list[int]:
+        """Other shapes than ellipses."""
+        return [row for row, kind in enumerate(self.layer.shape_type) if kind != "ellipse"]
 
     def moved(self, table: QTable, written: Array, current: Array) -> QTable:
         """Return the table with the ellipses that changed."""
         return adopt_shapes(table, written, current)
 
     def same(self, first: Array, second: Array) -> bool:
-        """Same ellipses, whatever corner comes first."""
+        """Tell whether the ellipses are the same, whatever corner comes first."""
         return same_ellipses(first, second)
 
     def make(self) -> Shapes:
@@ -274,14 +266,6 @@ class EllipsesLayer(SourceLayer):
         colors = styles.edge_colors(kinds)
         if colors:
             self.layer.edge_color = colors
-
-    def refuse(self) -> int:
-        """Remove shapes that are no ellipses; return how many there were."""
-        _, usable = self.read()
-        wrong = [int(row) for row in np.flatnonzero(~usable)]
-        if wrong:
-            self.layer.remove(wrong)
-        return len(wrong)
 
 
 def _no_rows() -> dict[str, Any]:

@@ -10,7 +10,7 @@ from astropy.io import fits
 from ..exposure import Exposure
 from ..fits_io import write_exposure
 from ..safe_write import replacing
-from .source_layers import MARKER
+from .marks import MARKER
 
 
 def write_fits(path: str, data: Any, meta: dict[str, Any]) -> list[str]:

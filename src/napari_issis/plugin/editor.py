@@ -1,0 +1,307 @@
+"""The source table and the two layers in which it is edited."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from astropy.table import QTable
+from napari.utils.notifications import show_error, show_warning
+from numpy.typing import NDArray
+
+from ..sources import (
+    DEFAULT_ELLIPTICITY,
+    DEFAULT_FLUX,
+    DEFAULT_PA,
+    DEFAULT_R_HALF,
+    empty_sources,
+    source,
+)
+from .picture import Drag
+from .source_layers import EllipsesLayer, Ids, PointsLayer, SourceLayer
+from .table import join, master_table
+
+# An ellipse whose semi-axes are shorter (pixels) was clicked, not drawn.
+CLICKED = 1.0
+
+
+class SourceEditor:
+    """Keeps the master source table and the layers that show it in step.
+
+    Parameters
+    ----------
+    changed : callable
+        Called, without arguments and often, when a layer may have been edited; `take_over`
+        then finds out.
+
+    Attributes
+    ----------
+    sources : astropy.table.QTable
+        The master table; never changed in place.
+    source_id : ndarray of int
+        A number for each row that stays with it.
+    version : int
+        Goes up with each change of the table.
+    drag : Drag or None
+        The drag (or drawing) in progress.
+    new_source : dict
+        Arguments of `napari_issis.source` for sources that are drawn by hand.
+    """
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        self._changed = changed
+        self.points = PointsLayer()
+        self.ellipses = EllipsesLayer()
+        self.sources = master_table(empty_sources())
+        self.source_id: Ids = np.empty(0, dtype=np.int64)
+        self.version = 0
+        self.drag: Drag | None = None
+        self.pivot = 2500.0
+        self.new_source: dict[str, Any] = {
+            "kind": "exponential",
+            "flux": DEFAULT_FLUX,
+            "r_half": DEFAULT_R_HALF,
+            "ellipticity": DEFAULT_ELLIPTICITY,
+            "pa": DEFAULT_PA,
+            "n": None,
+        }
+        self._last_id = 0
+        # Rows of deleted sources by id: these can come back by paste.
+        self._deleted: dict[int, QTable] = {}
+        self._adding = False
+        self._untidy = False
+        self._born: set[int] = set()
+        self._writing = False
+
+    @property
+    def views(self) -> tuple[SourceLayer, SourceLayer]:
+        """Ellipses and points, from the bottom up."""
+        return self.ellipses, self.points
+
+    @property
+    def layers(self) -> list[Any]:
+        """The layers that are there."""
+        return [view.layer for view in self.views if view.layer is not None]
+
+    # ---------------------------------------------------------------- table to layers
+
+    def replace(self, table: QTable) -> None:
+        """Put a master table in the place of all sources; `write` shows it."""
+        self.drag = None
+        self._born.clear()
+        self.sources = table
+        self.source_id = self._new_ids(len(table))
+        self.version += 1
+
+    def append(self, table: QTable) -> None:
+        """Append the rows of a master table; `write` shows them."""
+        self.sources = join(self.sources, table, pivot=self.pivot)
+        self.source_id = np.concatenate([self.source_id, self._new_ids(len(table))])
+        self.version += 1
+
+    def write(self) -> None:
+        """Make the layers show the table."""
+        with self.quiet():
+            for view in self.views:
+                view.write(self.sources, self.source_id)
+
+    def listen(self, layer: Any) -> None:
+        """Follow the edits of a layer."""
+        layer.events.set_data.connect(self._layer_changed)
+        layer.events.features.connect(self._layer_changed)
+        layer.events.data.connect(self._layer_edited)
+
+    @contextmanager
+    def quiet(self) -> Iterator[None]:
+        """Change layers without taking that for an edit of the user's."""
+        before, self._writing = self._writing, True
+        try:
+            yield
+        finally:
+            self._writing = before
+
+    # ---------------------------------------------------------------- layers to table
+
+    def _layer_changed(self, event: Any = None) -> None:
+        if not self._writing:
+            self._changed()
+
+    def _layer_edited(self, event: Any) -> None:
+        """Follow the start and end of a drag; napari tells no more during it."""
+        if self._writing:
+            return
+        action = str(getattr(event.action, "value", event.action))
+        view = self.points if event.source is self.points.layer else self.ellipses
+        if action in ("changing", "adding"):
+            self.take_over()
+            moving: list[int] = []
+            if action == "changing":
+                ids = view.current_ids()
+                moving = [int(ids[row]) for row in event.data_indices if -1 <= row < len(ids)]
+            else:
+                self._adding = True
+            self.drag = Drag(self.sources, self.source_id, frozenset(moving))
+        else:
+            self.drag = None
+            self._untidy = True
+        self._changed()
+
+    def layer_removed(self, layer: Any) -> None:
+        """Let the sources of a layer go that the user deleted."""
+        for view in self.views:
+            if view.layer is layer:
+                self.take_over()
+                view.layer = None
+                self.drag = None
+                self._changed()
+
+    def take_over(self) -> None:
+        """Take over what the user changed in the layers; cheap if nothing."""
+        if self._writing:
+            return
+        for view in self.views:
+            if view.layer is not None and view.foreign() and not self._refused(view):
+                continue
+            try:
+                if view.changed():
+                    self._adopt(view)
+                    self.version += 1
+                    self._untidy = True
+            except ValueError as error:
+                show_error(str(error))
+                self.drag = None
+                self.write()
+        if self.drag is None and self._untidy:
+            self._adding = self._untidy = False
+            self._tidy()
+
+    def _refused(self, view: SourceLayer) -> bool:
+        """Remove shapes that can be no sources, unless one is being drawn just now."""
+        if self.drag is not None:
+            return False
+        with self.quiet():
+            view.layer.remove(view.foreign())
+        self._adding = False
+        show_warning(
+            "Extended sources are ellipses: draw them with the ellipse tool. "
+            "Other shapes belong on a layer of your own."
+        )
+        return True
+
+    def _adopt(self, view: SourceLayer) -> None:
+        """Bring the table in step with one layer."""
+        mine = np.isin(self.source_id, view.source_id)
+        if view.layer is None:
+            for row in np.flatnonzero(mine):
+                self._deleted[int(self.source_id[row])] = self.sources[[row]]
+            self.sources, self.source_id = self.sources[~mine], self.source_id[~mine]
+            view.forget()
+            return
+        rows, before, fresh = view.survivors()
+        surviving = view.source_id[before]
+        places = self._places(surviving)
+        part = view.adopt(self.sources[places], rows, before)
+        table = self.sources.copy()
+        for name in part.colnames:
+            if name not in table.colnames:
+                table[name] = np.full(len(table), np.nan)
+            table[name][places] = part[name]
+        kept = ~mine | np.isin(self.source_id, surviving)
+        both = table[kept]
+        for row in fresh:
+            both = join(both, self._drawn(view, row), pivot=self.pivot)
+        # From here on nothing can fail.
+        for row in np.flatnonzero(~kept):
+            self._deleted[int(self.source_id[row])] = self.sources[[row]]
+        ids = self._new_ids(len(fresh))
+        self.sources, self.source_id = both, np.concatenate([self.source_id[kept], ids])
+        if len(fresh):
+            column = view.current_ids()
+            column[fresh] = ids
+            # In place: napari emits nothing.
+            view.layer.features["source_id"] = column
+            if self.drag is not None:
+                self._born |= set(ids.tolist())
+            self._color(view)
+        if len(fresh) or len(surviving) < len(view.source_id):
+            order = self._places(view.current_ids())
+            with self.quiet():
+                view.in_step(self.sources[order], self.source_id[order])
+        else:
+            view.note_geometry()
+
+    def _drawn(self, view: SourceLayer, row: int) -> QTable:
+        """Return the table row of a source that was drawn (as the form says) or pasted."""
+        data = view.read()
+        source_id = int(view.current_ids()[row])
+        place = int(self._places([source_id])[0])
+        if not self._adding and place >= 0:
+            base = self.sources[[place]]
+        elif not self._adding and source_id in self._deleted:
+            base = self._deleted[source_id].copy()
+        else:
+            base = self._template(view, *data[row].reshape(-1, 2).mean(axis=0))
+        return view.moved(base, view.geometry(base), data[row : row + 1])
+
+    def _template(self, view: SourceLayer, y: float, x: float) -> QTable:
+        new = dict(self.new_source)
+        if not view.holds([new["kind"]])[0]:
+            new["kind"] = "point" if view is self.points else "exponential"
+        if new["kind"] != "sersic":
+            new["n"] = None
+        return master_table(source(x=float(x), y=float(y), **new))
+
+    def _tidy(self) -> None:
+        """At rest: size clicked ellipses, show what the table says."""
+        self._size_clicked()
+        for view in self.views:
+            if view.layer is None:
+                continue
+            order = self._places(view.current_ids())
+            lost = np.any(order < 0) or len(order) != view.holds(self.sources["kind"]).sum()
+            if lost or not view.shows(self.sources[order]):
+                self.write()
+                return
+        for view in self.views:
+            if view.layer is not None:
+                self._settle(view)
+
+    def _settle(self, view: SourceLayer) -> None:
+        order = self._places(view.current_ids())
+        part = self.sources[order]
+        if view.changed() or view.stale(part):
+            self._color(view)
+            with self.quiet():
+                view.in_step(part, self.source_id[order])
+
+    def _size_clicked(self) -> None:
+        """Give ellipses that were clicked, not drawn, the size and shape of the form."""
+        born, self._born = self._born, set()
+        table = self.sources.copy() if born else self.sources
+        for row in self._places(sorted(born)):
+            if row < 0 or table["kind"][row] == "point" or table["r_half"][row].value >= CLICKED:
+                continue
+            base = self._template(self.ellipses, 0.0, 0.0)
+            for name in ("r_half", "ellipticity", "pa"):
+                table[name][row] = base[name][0]
+            self.version += 1
+        self.sources = table
+
+    def _color(self, view: SourceLayer) -> None:
+        if isinstance(view, EllipsesLayer):
+            order = self._places(view.current_ids())
+            kinds = [str(self.sources["kind"][row]) if row >= 0 else "" for row in order]
+            with self.quiet():
+                view.recolor(kinds)
+
+    def _places(self, ids: Any) -> NDArray[np.intp]:
+        """Rows of the table with these ids, -1 where there is none."""
+        known = {int(value): place for place, value in enumerate(self.source_id)}
+        return np.array([known.get(int(value), -1) for value in ids], dtype=np.intp)
+
+    def _new_ids(self, count: int) -> Ids:
+        first = self._last_id + 1
+        self._last_id += count
+        return np.arange(first, first + count, dtype=np.int64)

@@ -1,0 +1,84 @@
+"""Rows of labelled magicgui widgets that fit a narrow dock."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from magicgui.widgets.bases import ValueWidget
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import (
+    QComboBox,
+    QFormLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QSizePolicy,
+    QWidget,
+)
+
+
+class Form(QGroupBox):  # type: ignore[misc]
+    """A titled group of rows, each a label with one widget or two."""
+
+    def __init__(self, title: str) -> None:
+        super().__init__(title)
+        self._rows = QFormLayout(self)
+        self._rows.setContentsMargins(6, 2, 6, 4)
+        self._rows.setHorizontalSpacing(8)
+        self._rows.setVerticalSpacing(3)
+        self._rows.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self._rows.setLabelAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+
+    def add(self, label: str, *widgets: ValueWidget[Any]) -> QWidget:
+        """Add a row; return the field, which `show_row` shows or hides."""
+        for widget in widgets:
+            _narrow(widget.native)
+        if len(widgets) == 1:
+            field = widgets[0].native
+        else:
+            field = QWidget()
+            line = QHBoxLayout(field)
+            line.setContentsMargins(0, 0, 0, 0)
+            line.setSpacing(4)
+            for widget in widgets:
+                line.addWidget(widget.native, 1)
+        if label:
+            name = QLabel(label)
+            name.setBuddy(widgets[0].native)
+            name.setToolTip(widgets[0].tooltip or "")
+            self._rows.addRow(name, field)
+        else:
+            self._rows.addRow(field)
+        return field
+
+    def add_text(self, tooltip: str) -> QLabel:
+        """Add a row of text that wraps; return the label to write on."""
+        text = QLabel()
+        text.setWordWrap(True)
+        text.setMinimumWidth(10)
+        text.setToolTip(tooltip)
+        text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._rows.addRow(text)
+        return text
+
+    def show_row(self, field: QWidget, visible: bool) -> None:
+        """Show or hide a row with its label."""
+        field.setVisible(visible)
+        label = self._rows.labelForField(field)
+        if label is not None:
+            label.setVisible(visible)
+
+    def enable_row(self, field: QWidget, enabled: bool) -> None:
+        """Enable or disable a row with its label."""
+        field.setEnabled(enabled)
+        label = self._rows.labelForField(field)
+        if label is not None:
+            label.setEnabled(enabled)
+
+
+def _narrow(native: QWidget) -> None:
+    policy = native.sizePolicy()
+    native.setSizePolicy(QSizePolicy.Policy.Ignored, policy.verticalPolicy())
+    native.setMinimumWidth(40)
+    if isinstance(native, QComboBox):
+        native.setMinimumContentsLength(4)
