@@ -74,6 +74,13 @@ class RadialPSF:
         """Frequency beyond which the OTF is exactly zero (inf where it never is)."""
         return np.inf
 
+    def first_edge(self) -> float:
+        """Lowest frequency above zero at which the OTF is not smooth (inf if it always is).
+
+        Such an edge makes rings in the PSF that fall off slowly.
+        """
+        return np.inf
+
     def band_limit(self, threshold: float) -> float:
         """Frequency in cycles per arcsec beyond which \\|OTF\\| <= threshold."""
         if threshold >= 1:
@@ -205,6 +212,12 @@ class TelescopePSF(RadialPSF):
         """Highest frequency that the aperture passes: diameter / shortest wavelength."""
         shortest = self.band if isinstance(self.band, float) else self.band[0]
         return self.diameter / (shortest * 1e-10) / ARCSEC_PER_RADIAN
+
+    def first_edge(self) -> float:
+        """Where the overlap of the two rims begins: (1 - obscuration) / 2 of the cut-off."""
+        longest = self.band if isinstance(self.band, float) else self.band[1]
+        cutoff = self.diameter / (longest * 1e-10) / ARCSEC_PER_RADIAN
+        return cutoff if self.obscuration == 0 else 0.5 * (1 - self.obscuration) * cutoff
 
     def otf(self, k: ArrayLike) -> Array:
         """Annular OTF, averaged over the band, times the blur's."""

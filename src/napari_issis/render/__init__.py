@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from astropy.table import Table
 from numpy.typing import NDArray
 
 from ..observation import Observation
+from ..psf import RadialPSF
 from ..sources import SourceArrays, check_sources
 from .gaussians import decompose
 from .meshes import mesh_rate
 from .optics import Optics
-from .plan import BAND, Plan
+from .plan import BAND, make_plan
+from .profiles import sersic_transform
 from .stamps import add_stamps
 
 Array = NDArray[np.float64]
@@ -103,7 +107,15 @@ def _render(
     brightest: float,
 ) -> Array:
     """Render with an error of at most ``allowed`` cps per pixel."""
-    plan = make_plan(optics, allowed / brightest)
+    is_point = sources.kind == "point"
+    plan = make_plan(
+        optics,
+        shape,
+        allowed / brightest,
+        allowed / max(_ring_amplitude(optics, sources, rate), 1e-300),
+        int(is_point.sum()),
+        int((~is_point).sum()),
+    )
     share = 0.03 * allowed
     is_disc = sources.kind == "uniform"
     limit = min(BAND / plan.cell_size(0), optics.band_limit(0.01 * np.exp(-plan.digits)))
@@ -121,19 +133,33 @@ def _render(
     return image
 
 
-def make_plan(optics: Optics, accuracy: float) -> Plan:
-    """Choose the finest mesh and the number of digits for an accuracy relative to a peak."""
-    digits = float(np.ceil(4 * np.log(10 / max(accuracy, 1e-15))) / 4)
-    highest = optics.band_limit(0.1 * np.exp(-digits))
-    finest = 2.0 ** np.floor(np.log2(BAND / max(highest, 1e-6)))
-    return Plan(optics, digits, max(finest, 0.5), stamps=finest < 0.5)
+def _ring_amplitude(optics: Optics, sources: SourceArrays, rate: Array) -> float:
+    """Peak of the point source whose diffraction rings are as strong as the scene's strongest."""
+    psf = optics.psf
+    if not isinstance(psf, RadialPSF) or psf.first_edge() == np.inf:
+        return 0.0
+    ratio = 1 - sources.ellipticity
+    q = 2 * np.pi * sources.r_half * ratio * psf.first_edge() * optics.pixel_scale
+    sharp = np.ones_like(rate)
+    disc = sources.kind == "uniform"
+    # the envelope of 2 J1(z) / z
+    sharp[disc] = np.minimum(1.0, 1.6 * np.maximum(np.sqrt(2) * q[disc], 1e-9) ** -1.5)
+    for n in np.unique(sources.index[np.isfinite(sources.index)]):
+        chosen = sources.index == n
+        sharp[chosen] = sersic_transform(float(n))(q[chosen])
+    return float((rate * sharp).max()) / point_area(optics)
 
 
 def peaks(optics: Optics, sources: SourceArrays, rate: Array) -> Array:
     """Estimate the highest pixel of each source alone, cps per pixel, shape (n,)."""
-    k = (np.arange(2048) + 0.5) / 2048 * max(optics.band_limit(1e-4), 1e-9)
-    transfer = np.abs(np.asarray(optics.transfer(np.zeros(1), k)[0]))
-    area = 1 / (2 * np.pi * float(np.sum(k * transfer) * (k[1] - k[0])))
     size = np.pi * sources.r_half**2 * (1 - sources.ellipticity)
     # half of the light inside the half-light ellipse; cusps are higher, which is safe
-    return rate / (area + 2 * size)
+    return rate / (point_area(optics) + 2 * size)
+
+
+@lru_cache(maxsize=64)
+def point_area(optics: Optics) -> float:
+    """Flux over highest pixel of a point source, pixels."""
+    k = (np.arange(2048) + 0.5) / 2048 * max(optics.band_limit(1e-4), 1e-9)
+    transfer = np.abs(np.asarray(optics.transfer(np.zeros(1), k)[0]))
+    return 1 / (2 * np.pi * float(np.sum(k * transfer) * (k[1] - k[0])))

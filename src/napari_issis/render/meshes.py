@@ -16,6 +16,9 @@ from .optics import Transfer
 from .painting import paint
 from .plan import Plan
 
+# points of a mesh, some 4 GB of memory in all
+LARGEST_MESH = 1.3e8
+
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 Interval = tuple[float, float]
@@ -200,8 +203,8 @@ class _Level:
         for axis in (0, 1):
             low, high = frame[axis][0] * self.cell, frame[axis][1] * self.cell
             reach = plan.reach(level)
-            # room for what is usually painted, so that the mesh and its filters stay the same
-            edge = reach + cut * sigma + 2 * self.cell
+            # the same for all scenes that lie in the frame, so that filters can be kept
+            edge = cut * sigma + 2 * self.cell
             content = [low - edge, high + edge]
             for centre, half in (
                 (
@@ -232,6 +235,12 @@ class _Level:
         self.axes = (axes[0], axes[1])
         self.shape = (axes[0].count, axes[1].count)
         start = (axes[0].start, axes[1].start)
+        if self.shape[0] * self.shape[1] > LARGEST_MESH:
+            raise ValueError(
+                f"this accuracy needs a mesh of {self.shape[0]} x {self.shape[1]} points, because "
+                "the PSF's diffraction rings reach far; choose a larger tolerance, a smaller "
+                "frame or a PSF averaged over a band."
+            )
         self.plain_mesh = self.low_mesh = None
         if len(plain):
             self.plain_mesh = np.zeros(self.shape)
@@ -246,13 +255,12 @@ class _Level:
 
     def transform(self) -> tuple[Spectrum, Spectrum]:
         """Transform of the contribution, and that of the density to pass on."""
-        filters = _filters(self.plan, self.level, self.last, self.shape)
         spectrum: Spectrum | None = None
         onward: Spectrum | None = None
         next_y, next_x = self._widening(2.0, 0.0)
         if self.low_mesh is not None:
             transformed = fft.rfft2(self.low_mesh, workers=-1)
-            spectrum = transformed * filters[0]
+            spectrum = transformed * self._filter(spread=True)
             if not self.last:
                 more_y, more_x = self._widening(2.0, 1.0)
                 transformed *= more_y[:, None]
@@ -260,7 +268,7 @@ class _Level:
                 onward = transformed
         if self.plain_mesh is not None:
             transformed = fft.rfft2(self.plain_mesh, workers=-1)
-            filtered = transformed * filters[1]
+            filtered = transformed * self._filter(spread=False)
             spectrum = filtered if spectrum is None else spectrum + filtered
             if not self.last:
                 transformed *= next_y[:, None]
@@ -268,6 +276,9 @@ class _Level:
                 onward = transformed if onward is None else onward + transformed
         assert spectrum is not None
         return spectrum, spectrum if onward is None else onward
+
+    def _filter(self, *, spread: bool) -> Transfer:
+        return _filter(self.plan, self.level, self.last, self.shape, spread)
 
     def _widening(self, to: float, already: float) -> tuple[Array, Array]:
         """Transform of the Gaussian that widens from ``already`` to ``to`` cells' spreading."""
@@ -308,7 +319,9 @@ def _axis(
     content: Interval, frame: tuple[int, int], reach: float, cell: float, room: float
 ) -> Axis:
     """Lay out an axis so that neither the kernel nor what is passed on wraps into the frame."""
-    start = 2 * cell * np.floor((content[0] - room) / (2 * cell))
+    # on a point of the next mesh, and on a pixel
+    step = max(2 * cell, 1.0)
+    start = step * np.floor((content[0] - room) / step)
     need = max(
         content[1] + room - start,
         frame[1] * cell + reach - content[0],
@@ -320,29 +333,27 @@ def _axis(
 
 
 @lru_cache(maxsize=48)
-def _filters(plan: Plan, level: int, last: bool, shape: tuple[int, int]) -> tuple[Transfer, Transfer]:
-    """Filters of a mesh: for what is spread on it, and for what is painted as it is."""
+def _filter(plan: Plan, level: int, last: bool, shape: tuple[int, int], spread: bool) -> Transfer:
+    """Filter of a mesh, for what is spread on it or for what is painted as it is."""
     cell = plan.cell_size(level)
     ky, kx = fft.fftfreq(shape[0], cell), fft.rfftfreq(shape[1], cell)
     limit = 0.5 / cell  # the mesh resolves nothing beyond
+    rows = np.arange(shape[0])
     if plan.optics.radial:
         # even in ky: half of the rows hold everything
-        half = shape[0] // 2 + 1
-        rows = np.minimum(np.arange(shape[0]), shape[0] - np.arange(shape[0]))
-        ky = np.abs(ky[:half])
-    else:
-        rows = np.arange(shape[0])
+        rows = np.minimum(rows, shape[0] - rows)
+        ky = np.abs(ky[: shape[0] // 2 + 1])
     k = np.hypot(ky[:, None], kx)
-    transfer = plan.optics.transfer(ky, kx, limit)
-    beyond = 0.0 if last else plan.lowpass(k, level + 1)
-    sigma = plan.spread() * cell
-    with np.errstate(over="ignore"):
-        unspread = np.where(k <= limit, np.exp(2 * np.minimum(np.pi * sigma * k, 18.0) ** 2), 0.0)
-    low = transfer * (plan.lowpass(k, level) - beyond) * unspread
-    plain = transfer * (plan.lowpass(k, 0) - beyond)
-    return low[rows], plain[rows]
-
-
+    passed = plan.lowpass(k, level if spread else 0)
+    if not last:
+        passed = passed - plan.lowpass(k, level + 1)
+    passed[k > limit] = 0.0
+    if spread:
+        sigma = plan.spread() * cell
+        for frequency, shape_ in ((ky, (-1, 1)), (kx, (1, -1))):
+            passed *= np.exp(2 * (np.pi * sigma * frequency) ** 2).reshape(shape_)
+    filtered = plan.optics.transfer(ky, kx, limit) * passed
+    return filtered[rows]
 
 
 def fold(spectrum: Spectrum, ny: int, nx: int) -> Spectrum:

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 # highest frequency used on a mesh, cycles per cell (0.5 would be its Nyquist frequency)
 BAND = 0.35
+# points of a mesh (0.4 GB) above which stamps are preferred
+LARGEST_MESH = 5e7
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,9 @@ class Plan:
         The transfer function.
     digits : float
         Natural logarithm of the accuracy: errors are about exp(-digits) of what they belong to.
+    ring_digits : float
+        The same for the rings of a diffraction PSF about the scene's sharpest source; zero or
+        less where they do not matter.
     cell : float
         Cell of the finest mesh, pixels; a power of two.
     stamps : bool
@@ -48,6 +53,7 @@ class Plan:
 
     optics: Optics
     digits: float
+    ring_digits: float
     cell: float
     stamps: bool
 
@@ -102,6 +108,58 @@ class Plan:
         return _reach(self, level)
 
 
+def make_plan(
+    optics: Optics,
+    shape: tuple[int, int],
+    accuracy: float,
+    ring_accuracy: float,
+    points: int,
+    extended: int,
+) -> Plan:
+    """Choose the meshes for a frame and a number of sources, by estimated run time.
+
+    Parameters
+    ----------
+    optics : Optics
+        The transfer function.
+    shape : (int, int)
+        Frame in pixels.
+    accuracy : float
+        Error allowed over the brightest source's peak.
+    ring_accuracy : float
+        Error allowed over the amplitude of the sharpest source's rings.
+    points, extended : int
+        Numbers of sources.
+    """
+    # a tenth of the error allowed, in quarter steps so that plans are shared
+    digits = float(np.ceil(4 * np.log(10 / max(accuracy, 1e-15))) / 4)
+    ring_digits = float(np.ceil(2 * np.log(10 / max(ring_accuracy, 1e-15))) / 2)
+    highest = max(optics.band_limit(0.1 * np.exp(-digits)), 1e-6)
+    finest = 2.0 ** np.floor(np.log2(BAND / highest))
+    meshes = Plan(optics, digits, max(ring_digits, 0.0), finest, stamps=False)
+    if finest >= 0.5:
+        return meshes
+    stamps = Plan(optics, digits, max(ring_digits, 0.0), 0.5, stamps=True)
+    if _seconds(meshes, shape, points, extended) < _seconds(stamps, shape, points, extended):
+        return meshes
+    return stamps
+
+
+def _seconds(plan: Plan, shape: tuple[int, int], points: int, extended: int) -> float:
+    """Rough run time on one core."""
+    reach = plan.reach(0)
+    mesh = float(np.prod([(n + reach) / plan.cell for n in shape]))
+    seconds = 3e-8 * mesh + 1e-8 * points * (2 * plan.cut() * plan.spread()) ** 2
+    if mesh > LARGEST_MESH:
+        seconds *= mesh / LARGEST_MESH
+    if plan.stamps:
+        pixels = 2 * plan.reach(-1) + 1
+        modes = pixels * plan.optics.band_limit(0.1 * np.exp(-plan.digits))
+        product = 2e-10 * (pixels * modes**2 + pixels**2 * modes)
+        seconds += points * product + extended * (4 * product + 1e-7 * modes**2)
+    return seconds
+
+
 @lru_cache(maxsize=256)
 def _reach(plan: Plan, level: int) -> float:
     # the filter's edge has the transform exp(-pi^2 width^2 r^2)
@@ -109,7 +167,9 @@ def _reach(plan: Plan, level: int) -> float:
     psf = plan.optics.psf
     if not isinstance(psf, RadialPSF):
         return window + plan.optics.extent
-    return window if level > 2 else max(window, _ring_reach(plan, psf, level, window))
+    if plan.ring_digits <= 0 or psf.first_edge() == np.inf or level > 3:
+        return window
+    return max(window, _ring_reach(plan, psf, level, window))
 
 
 def _ring_reach(plan: Plan, psf: RadialPSF, level: int, start: float) -> float:
@@ -119,12 +179,15 @@ def _ring_reach(plan: Plan, psf: RadialPSF, level: int, start: float) -> float:
     are measured on the kernel, the Hankel transform of its filter, out to six times the
     filter's own reach, and beyond that by their law.
     """
-    limit = plan.optics.band_limit(0.1 * np.exp(-plan.digits))
+    limit = plan.optics.band_limit(0.1 * np.exp(-plan.ring_digits))
     if limit <= 0:
         return start
     r = start * np.geomspace(1.0, 6.0, 400)
-    x, weight = np.polynomial.legendre.leggauss(int(np.pi * limit * r[-1]) + 200)
-    k = 0.5 * limit * (x + 1)
+    # Gauss-Legendre on panels of less than two oscillations each
+    x, w = np.polynomial.legendre.leggauss(16)
+    panels = int(limit * r[-1]) + 8
+    k = ((np.arange(panels)[:, None] + 0.5 * (x + 1)) * (limit / panels)).ravel()
+    weight = np.tile(w, panels)
     # the pixel as a Gaussian of the same variance: the mean over angle is what matters here
     pixel = np.exp(-(np.pi**2) * k**2 / 6)
     measure = weight * k * pixel * psf.otf(k / plan.optics.pixel_scale)
@@ -132,7 +195,7 @@ def _ring_reach(plan: Plan, psf: RadialPSF, level: int, start: float) -> float:
     band = measure * (passed - plan.lowpass(k, level + 1))
     kernel = np.abs(special.j0(2 * np.pi * np.outer(r, k)) @ band) / abs(measure.sum())
     envelope = np.maximum.accumulate(kernel[::-1])[::-1]
-    allowed = 0.3 * np.exp(-plan.digits)
+    allowed = 0.3 * np.exp(-plan.ring_digits)
     below = np.flatnonzero(envelope <= allowed)
     if below.size:
         return float(r[below[0]])
