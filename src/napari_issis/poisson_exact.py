@@ -9,19 +9,8 @@ _DIGITS = 60
 _SUMMED_BELOW = 2000
 _STEP = Decimal(1) / 20
 _HALF_LOG_TWO_PI = Decimal("0.918938533204672741780329736405617639861397473637783412817151540483")
-# B_2j / (2j (2j - 1)): Stirling's series of ln k! to 1e-50 for k >= 2000.
-_STIRLING = tuple(
-    Decimal(numerator) / denominator
-    for numerator, denominator in (
-        (1, 12),
-        (-1, 360),
-        (1, 1260),
-        (-1, 1680),
-        (1, 1188),
-        (-691, 360360),
-        (1, 156),
-    )
-)
+# (2j (2j - 1)) / B_2j: Stirling's series of ln k!, to 2e-33 for k >= 2000.
+_STIRLING = (Decimal(12), Decimal(-360), Decimal(1260), Decimal(-1680))
 
 
 def poisson_cdf(k: int, lam: float) -> Decimal:
@@ -60,7 +49,7 @@ def poisson_cdf(k: int, lam: float) -> Decimal:
                 total += term
             return total * (-mean).exp()
         n = Decimal(k)
-        stirling = sum(c / n ** (2 * j + 1) for j, c in enumerate(_STIRLING))
+        stirling = sum(1 / (c * n ** (2 * j + 1)) for j, c in enumerate(_STIRLING))
         log_pmf = n - mean + n * (mean / n).ln() - n.ln() / 2 - _HALF_LOG_TWO_PI - stirling
         step = n.sqrt() if n < mean else -n.sqrt()
         integral = Decimal(0)
