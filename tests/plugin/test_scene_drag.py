@@ -120,7 +120,8 @@ def test_rotating_an_ellipse_by_its_handle(scene, mouse):
     turn = np.radians(25.0)
     # Counter-clockwise as seen: y up, x to the right; from +x towards +y.
     y, x = radius
-    target = centre + [y * np.cos(turn) + x * np.sin(turn), x * np.cos(turn) - y * np.sin(turn)]
+    turned = [y * np.cos(turn) + x * np.sin(turn), x * np.cos(turn) - y * np.sin(turn)]
+    target = centre + np.array(turned)
     halfway = centre + 0.5 * (radius + target - centre)
     mouse.drag(tuple(handle[::-1]), tuple(halfway[::-1]), tuple(target[::-1]))
     scene.wait()

@@ -222,7 +222,7 @@ class SourceEditor:
             column[fresh] = ids
             # In place: napari emits nothing.
             view.layer.features["source_id"] = column
-            if self.drag is not None:
+            if self._adding:
                 self._born |= set(ids.tolist())
             self._color(view)
         if len(fresh) or len(surviving) < len(view.source_id):

@@ -136,10 +136,7 @@ def _frames(shape: tuple[int, int]) -> list[tuple[str, tuple[int, int]]]:
     sizes = [(n, n) for n in FRAME_SIZES]
     if shape not in sizes:
         sizes.append(shape)
-    return [
-        (f"{nx} × {ny}  ({nx * PIXEL_SCALE:.1f}″ wide)", (ny, nx))
-        for ny, nx in sizes
-    ]
+    return [(f"{nx} × {ny}  ({nx * PIXEL_SCALE:.1f}″ wide)", (ny, nx)) for ny, nx in sizes]
 
 
 def _sky_text(observation: Observation) -> str:

@@ -16,7 +16,7 @@ class LatestWins:
     deliver : callable
         Gets each job's result, in the GUI thread and in the order of the requests.
     fail : callable
-        Gets the exception of a job that failed; napari shows it as a notification too.
+        Gets the exception of a job that failed.
     """
 
     def __init__(

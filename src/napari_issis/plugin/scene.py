@@ -9,6 +9,7 @@ from weakref import WeakValueDictionary
 from astropy.table import QTable, Table
 from napari.layers import Image
 from napari.utils.events import EmitterGroup, Event
+from napari.utils.notifications import show_error
 from napari.viewer import Viewer
 from qtpy.QtCore import QEventLoop, QTimer
 from qtpy.QtWidgets import QApplication
@@ -337,8 +338,9 @@ class Scene:
             self.events.picture()
 
     def _failed(self, error: BaseException) -> None:
-        # napari shows it; the last good picture stays.
+        # The last good picture stays.
         self._error = error
+        show_error(f"The scene could not be simulated: {error}")
 
 
 def scene_of(viewer: Any) -> Scene | None:

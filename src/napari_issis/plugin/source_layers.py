@@ -114,6 +114,8 @@ class SourceLayer:
         selected = set(self.current_ids()[list(self.layer.selected_data)])
         self.replace(self.geometry(part), part)
         self.layer.features = features(part, ids)
+        mark = {"role": self.role, "flux_unit": str(table["flux"].unit)}
+        self.layer.metadata = {**self.layer.metadata, MARKER: mark}
         self.layer.selected_data = {
             int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
         }

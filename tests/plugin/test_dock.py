@@ -1,0 +1,243 @@
+"""The widgets in a real napari window, and the samples."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from napari.utils.notifications import notification_manager
+from npe2 import PluginManifest
+from qtpy.QtWidgets import QApplication
+from small_scene import SMALL, few_sources
+
+from napari_issis import Exposure, random_sources, simulate, source
+from napari_issis.exposure import same_table
+from napari_issis.plugin import samples
+from napari_issis.plugin.dock import SimulatorWidget
+from napari_issis.plugin.instrument_form import InstrumentForm
+from napari_issis.plugin.scene import open_scene, scene_of
+from napari_issis.plugin.source_form import SourceForm
+from napari_issis.scenes import SCENES, example_scene
+
+pytestmark = pytest.mark.filterwarnings("ignore::napari_issis.CountRateWarning")
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def form(scene, qtbot):
+    form = SourceForm(scene)
+    qtbot.addWidget(form)
+    return form
+
+
+@pytest.fixture
+def instrument(scene, qtbot):
+    form = InstrumentForm(scene)
+    qtbot.addWidget(form)
+    return form
+
+
+def test_defaults_are_the_papers(form):
+    """Catches other defaults than those of the paper's forms."""
+    assert same_table(form.table(), source("exponential", 256, 256))
+    form.mode.value = "random"
+    form.seed.value = 7
+    assert same_table(form.table(), random_sources("exponential", 100, shape=(64, 80), seed=7))
+
+
+def test_every_kind_and_mode_can_be_added(scene, form):
+    for kind in ("point", "uniform", "gaussian", "exponential", "devaucouleurs", "sersic"):
+        form.kind.value = kind
+        form.mode.value = "specific"
+        form.button.native.click()
+        form.mode.value = "random"
+        form.number.value = 10
+        form.button.native.click()
+    kinds, numbers = np.unique(scene.sources["kind"][4:], return_counts=True)
+    assert list(numbers) == [11] * 6
+    assert len(kinds) == 6
+    assert form.seed.value == 7
+    scene.wait()
+    assert scene.exposure == simulate(scene.sources, SMALL)
+
+
+def test_fields_that_do_not_matter_are_disabled(form):
+    form.kind.value = "point"
+    assert not form.r_half.native.isEnabled()
+    assert not form.pa_limits.low.native.parent().isEnabled()
+    form.kind.value = "exponential"
+    assert form.r_half.native.isEnabled()
+    assert not form.n.native.isEnabled()
+    form.kind.value = "sersic"
+    assert form.n.native.isEnabled()
+
+
+def test_a_wrong_value_is_shown_and_adds_nothing(scene, form):
+    notification_manager.records.clear()
+    form.flux.value = "1e-14 Jy"
+    form.button.native.click()
+    form.flux.value = "-1"
+    form.button.native.click()
+    form.mode.value = "random"
+    form.e_limits.high.value = "1.5"
+    form.button.native.click()
+    texts = [str(note.message) for note in notification_manager.records]
+    assert len(texts) == 3
+    for text, name in zip(texts, ("'1e-14 Jy'", "flux", "ellipticity"), strict=True):
+        assert name in text
+    assert len(scene.sources) == 4
+
+
+def test_the_form_says_what_is_drawn_by_hand(scene, form):
+    form.kind.value = "sersic"
+    form.n.value = 3.5
+    form.flux.value = "2e-15"
+    assert scene.new_source["kind"] == "sersic"
+    assert scene.new_source["n"] == 3.5
+    form.flux.value = "2e-"
+    assert scene.new_source["flux"] == 2e-15
+
+
+def test_the_instrument_form_sets_the_observation(scene, instrument):
+    instrument.channel.value = "FUV"
+    instrument.wheel2.value = "NF1"
+    instrument.exposure.value = 250.0
+    instrument.frame.value = (256, 256)
+    instrument.seed.value = 3
+    instrument.new_noise.native.click()
+    assert scene.observation == SMALL.replace(
+        channel="FUV", filters=("open", "NF1"), exposure=250.0, shape=(256, 256)
+    )
+    assert scene.seed == 4
+    assert instrument.seed.value == 4
+    # 4.9e-3 and 7.2e-12 cps per pixel behind NF1.
+    assert "0.00049 cps/px" in instrument.sky.text()
+    assert "7.2e-13" in instrument.sky.text()
+
+
+def test_the_instrument_form_follows_scripts_only_while_shown(scene, instrument):
+    """Catches forms that work while nobody sees them."""
+    instrument.resume()
+    scene.observation = SMALL.replace(exposure=7.0)
+    assert instrument.exposure.value == 7.0
+    instrument.pause()
+    scene.observation = SMALL.replace(exposure=8.0)
+    assert instrument.exposure.value == 7.0
+    instrument.resume()
+    assert instrument.exposure.value == 8.0
+    assert "given by a script" in instrument.psf.text()
+    scene.observation = SMALL.replace(psf=None)
+    assert "assumed" in instrument.psf.text()
+    instrument.pause()
+
+
+def test_count_rate_warnings_are_shown_in_place(scene, instrument):
+    instrument.resume()
+    scene.add(source("point", 30, 30, flux=1e-12))
+    scene.wait()
+    assert "linear" in instrument.warning.text()
+    assert not instrument.warning.isHidden()
+    scene.sources = few_sources()[:0]
+    scene.wait()
+    assert instrument.warning.isHidden()
+    instrument.pause()
+
+
+def test_save_fits(scene, qtbot, tmp_path, monkeypatch):
+    widget = SimulatorWidget(scene.viewer)
+    qtbot.addWidget(widget)
+    assert widget.scene is scene
+    monkeypatch.setattr(widget, "ask_path", lambda: str(tmp_path / "x.fits"))
+    scene.add(source("point", 30, 30))
+    widget.save.native.click()
+    assert Exposure.read(tmp_path / "x.fits") == scene.exposure
+    assert len(scene.exposure.sources) == 5
+    notification_manager.records.clear()
+    monkeypatch.setattr(widget, "ask_path", lambda: str(tmp_path / "no" / "x.fits"))
+    widget.save.native.click()
+    assert "does not exist" in str(notification_manager.records[-1].message)
+    monkeypatch.setattr(widget, "ask_path", lambda: None)
+    widget.save.native.click()
+
+
+def test_the_menu_makes_a_scene_in_its_viewer(make_napari_viewer_proxy, npe2pm):
+    """Catches a widget that needs a script, or that uses what plugins may not."""
+    viewer = make_napari_viewer_proxy()
+    with npe2pm.tmp_plugin(manifest=PluginManifest.from_file(ROOT / "napari.yaml")):
+        _, widget = viewer.window.add_plugin_dock_widget("napari-issis", "ISSIS simulator")
+        assert [layer.name for layer in viewer.layers] == [
+            "ISSIS counts",
+            "ISSIS extended sources",
+            "ISSIS point sources",
+        ]
+        scene = scene_of(viewer)
+        assert widget.scene is scene
+        widget.sources.button.native.click()
+        scene.wait()
+        assert scene.exposure == simulate(source("exponential", 256, 256))
+        assert open_scene(viewer=viewer) is scene
+        assert len(viewer.window.dock_widgets) == 1
+
+
+def test_open_sample_gives_a_live_scene(make_napari_viewer, npe2pm, qtbot, monkeypatch):
+    """Catches samples that are dead pictures, and a scene lost without a question."""
+    viewer = make_napari_viewer()
+    monkeypatch.setattr(samples.napari, "current_viewer", lambda: viewer)
+    asked = []
+    monkeypatch.setattr(samples, "_may_replace", lambda count: asked.append(count) or False)
+    with npe2pm.tmp_plugin(manifest=PluginManifest.from_file(ROOT / "napari.yaml")):
+        viewer.open_sample("napari-issis", "q2237")
+        assert len(viewer.layers) == 3
+        qtbot.waitUntil(lambda: scene_of(viewer) is not None, timeout=5000)
+        scene = scene_of(viewer)
+        scene.wait()
+        example = example_scene("q2237")
+        assert scene.exposure == simulate(example.sources, example.observation)
+        assert scene.layers == list(viewer.layers)
+        viewer.open_sample("napari-issis", "blend")
+        qtbot.waitUntil(lambda: asked == [5], timeout=5000)
+        assert len(viewer.layers) == 3
+        assert len(scene.sources) == 5
+        monkeypatch.setattr(samples, "_may_replace", lambda count: True)
+        viewer.open_sample("napari-issis", "blend")
+        qtbot.waitUntil(lambda: len(viewer.layers) == 3, timeout=5000)
+        scene.wait()
+        assert len(scene.sources) == 2
+        assert scene.observation == example_scene("blend").observation
+
+
+def test_each_builtin_scene_is_a_sample():
+    keys = {
+        sample.key
+        for sample in PluginManifest.from_file(ROOT / "napari.yaml").contributions.sample_data
+    }
+    assert keys == set(SCENES)
+
+
+@pytest.mark.needs_gl
+def test_the_picture_on_the_screen(make_napari_viewer):
+    """Catches a frame upside down or mirrored, and markers off their sources.
+
+    One star near the lower left corner: in the window its light and its red marker have to be
+    in the lower left quarter, one around the other.
+    """
+    viewer = make_napari_viewer(show=True)
+    scene = open_scene(
+        source("point", 60, 40, 1e-13), SMALL.replace(shape=(256, 256)), viewer=viewer, dock=False
+    )
+    scene.wait()
+    for _ in range(5):
+        QApplication.processEvents()
+    points = scene.editor.points.layer
+    points.visible = False
+    light = viewer.screenshot(flash=False)[..., :3].astype(float)
+    points.visible = True
+    marked = viewer.screenshot(flash=False)[..., :3].astype(float)
+    height, width = light.shape[:2]
+    bright = np.argwhere(light.min(axis=-1) > 200)
+    y, x = bright.mean(axis=0)
+    assert y > 0.6 * height
+    assert x < 0.5 * width
+    red = np.argwhere((marked[..., 0] > 150) & (marked[..., 1] < 60))
+    assert red.mean(axis=0) == pytest.approx([y, x], abs=3)
