@@ -146,7 +146,7 @@ def _ring_amplitude(optics: Optics, sources: SourceArrays, rate: Array) -> float
     sharp[disc] = np.minimum(1.0, 1.6 * np.maximum(np.sqrt(2) * q[disc], 1e-9) ** -1.5)
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
         chosen = sources.index == n
-        sharp[chosen] = sersic_transform(float(n))(q[chosen])
+        sharp[chosen] = sersic_transform(float(n), q[chosen])
     return float((rate * sharp).max()) / point_area(optics)
 
 

@@ -142,8 +142,8 @@ def _shorten(gaussians: Gaussians, digits: float, shortest: float) -> Gaussians:
     """Cut long Gaussians into chains of shorter ones.
 
     A Gaussian is the convolution of a shorter one with another, which the trapezoid rule with
-    a spacing d replaces by a chain; its error is exp(-2 pi^2 sigma^2 / d^2), sigma that of a
-    link.
+    a spacing d replaces by a chain. Its error is exp(-2 pi^2 sigma^2 / d^2), sigma being the
+    width of the product of the two, at most that of either.
     """
     long = gaussians.major > np.maximum(MOST_ELONGATED * gaussians.minor, shortest)
     if not long.any():
@@ -152,9 +152,9 @@ def _shorten(gaussians: Gaussians, digits: float, shortest: float) -> Gaussians:
     for i in np.flatnonzero(long):
         one = gaussians.take(slice(i, i + 1))
         minor, major = float(one.minor[0]), float(one.major[0])
-        link = max(MOST_ELONGATED * minor, shortest, 0.01 * major)
+        link = max(0.6 * MOST_ELONGATED * minor, 0.6 * shortest, 0.01 * major)
         rest = np.sqrt(major**2 - link**2)
-        spacing = link * np.sqrt(2 * np.pi**2 / (digits + 2))
+        spacing = link * rest / major * np.sqrt(2 * np.pi**2 / (digits + 2))
         count = int(np.ceil(rest * np.sqrt(2 * (digits + 2)) / spacing))
         offset = np.arange(-count, count + 1) * spacing
         weight = np.exp(-0.5 * (offset / rest) ** 2)

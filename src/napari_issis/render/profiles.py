@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
+from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -130,31 +131,41 @@ def _stable_density_log(log_s: Array, beta: float) -> Array:
     return density
 
 
-@dataclass(frozen=True, eq=False)
-class RadialTransform:
-    """Hankel transform of a unit-flux profile of half-light radius 1, tabulated.
+def sersic_transform(n: float, q: Array) -> Array:
+    """Hankel transform of the unit-flux Sersic profile of half-light radius 1.
 
-    ``q`` is 2 pi times the frequency in cycles per half-light radius.
+    Parameters
+    ----------
+    n : float
+        Sersic index.
+    q : ndarray
+        2 pi times the frequency in cycles per half-light radius.
     """
-
-    log_q: Array
-    log_value: Array
-
-    def __call__(self, q: Array) -> Array:
-        """Transform at q >= 0, linear in the logarithms between the nodes."""
+    value: Array
+    if n == 0.5:
+        value = np.exp(-0.25 / np.log(2) * q**2)
+    elif n == 1.0:
+        square = 1 + (q / sersic_b(1.0)) ** 2
+        value = 1 / (square * np.sqrt(square))
+    else:
         with np.errstate(divide="ignore"):
-            value: Array = np.exp(np.interp(np.log(q), self.log_q, self.log_value))
-        return value
+            log_q = np.log(q)
+        value = np.exp(_log_transform(n)(np.clip(log_q, *LOG_Q_RANGE)))
+    return value
+
+
+# range of ln q tabulated: on its left every transform is 1, on its right nothing passes a PSF
+LOG_Q_RANGE = (-23.0, 18.5)
 
 
 @lru_cache(maxsize=512)
-def sersic_transform(n: float) -> RadialTransform:
-    """Transform of the Sersic profile of index n, summed from its Gaussians."""
-    gaussians = sersic_gaussians(n, 25.0)
-    log_q = np.linspace(np.log(1e-7), np.log(1e8), 9001)
+def _log_transform(n: float) -> CubicSpline:
+    """Logarithm of the transform of the Sersic profile of index n, summed from its Gaussians."""
+    gaussians = sersic_gaussians(n, 30.0)
+    log_q = np.linspace(*LOG_Q_RANGE, 4000)
     exponent = -0.5 * np.exp(2 * log_q)[:, None] * gaussians.sigma**2
     value = np.exp(np.maximum(exponent, -700.0)) @ gaussians.fraction
-    return RadialTransform(log_q, np.log(np.maximum(value, 1e-300)))
+    return CubicSpline(log_q, np.log(np.maximum(value, 1e-300)))
 
 
 def disc_transform(q: Array) -> Array:

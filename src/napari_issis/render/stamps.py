@@ -209,7 +209,7 @@ def _transform(one: SourceArrays, ky: Array, kx: Array) -> Array:
     )
     if one.kind[0] == "uniform":
         return disc_transform(q)
-    return sersic_transform(float(one.index[0]))(q)
+    return sersic_transform(float(one.index[0]), q)
 
 
 def _needed_limit(plan: Plan, one: SourceArrays, rate: float, allowed: float) -> float:
@@ -230,7 +230,7 @@ def _needed_limit(plan: Plan, one: SourceArrays, rate: float, allowed: float) ->
         z = np.sqrt(2) * q
         profile = np.minimum(1.0, 2 * np.sqrt(2 / np.pi) * z**-1.5)
     else:
-        profile = sersic_transform(float(one.index[0]))(q)
+        profile = sersic_transform(float(one.index[0]), q)
     amplitude = profile.mean(axis=1) * _radial_high_pass(plan, limit, count)
     tail = np.cumsum((2 * np.pi * k * amplitude)[::-1])[::-1] * (limit / count) * abs(rate)
     needed = np.flatnonzero(tail > allowed)
