@@ -135,8 +135,8 @@ def test_count_rate_warnings_are_lines(capsys):
         (["blend", "--output", "x.fits", "--frame", "0"], r"shape is \(0, 0\)"),
         (["blend", "--output", "x.fits", "--frame", "1", "2", "3"], r"shape is \(1, 2, 3\)"),
         (["blend", "--output", "x.fits", "--scale", "cubic"], "'cubic'"),
-        (["star.ecsv", "--output", "x.fits", "--frame", "16", "--seed", "-1"], "seed"),
-        (["star.ecsv", "--output", "x.fits", "--frame", "16", "--tolerance", "0"], "tolerance"),
+        (["star.ecsv", "--output", "x.fits", "--frame", "32", "--seed", "-1"], "seed"),
+        (["star.ecsv", "--output", "x.fits", "--frame", "32", "--tolerance", "0"], "tolerance"),
     ],
 )
 @pytest.mark.usefixtures("star")
@@ -261,7 +261,7 @@ def test_simulate_loads_neither_napari_nor_qt(star):
     program = (
         "import sys\n"
         "from napari_issis.cli import main\n"
-        f"main(['simulate', {star!r}, '--frame', '16', '--output', 'x.fits', '--png', 'x.png'])\n"
+        f"main(['simulate', {star!r}, '--frame', '32', '--output', 'x.fits', '--png', 'x.png'])\n"
         "heavy = {'napari', 'qtpy', 'PyQt6', 'PySide6', 'PyQt5', 'magicgui', 'vispy', 'superqt'}\n"
         "loaded = heavy & {name.split('.')[0] for name in sys.modules}\n"
         "assert not loaded, loaded\n"

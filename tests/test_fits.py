@@ -46,7 +46,10 @@ def exposure_of(observation, sources=GALAXY, *, brightest=400, seed=7):
 
 def image_psf(*, negative=False):
     array = np.random.default_rng(2).random((5, 8))
-    return ImagePSF(array - 0.49 if negative else array, ODD / 10, includes_pixel=True)
+    if negative:
+        # Samples that nearly cancel: their sum is 1 to some 1e-12 only, however often scaled.
+        array = 1e4 * (array - array.mean()) + 0.01
+    return ImagePSF(array, ODD / 10, includes_pixel=True)
 
 
 OBSERVATIONS = {
@@ -95,6 +98,11 @@ def test_every_observation_comes_back(tmp_path, name, compress):
         assert not back.observation.psf.array.flags.writeable
 
 
+def test_the_psf_that_tests_scaling_does_so():
+    psf = image_psf(negative=True)
+    assert ImagePSF(psf.array, 1.0).array.tobytes() != psf.array.tobytes()
+
+
 @pytest.mark.parametrize("name", TABLES)
 def test_every_source_table_comes_back(tmp_path, name):
     """Catches units or AB magnitudes lost, floats of 32 bits, and NaN read as missing."""
@@ -109,14 +117,14 @@ def test_every_source_table_comes_back(tmp_path, name):
         assert after.dtype.isnative
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
-    exposure=st.floats(5e-324, 1e300),
-    background=st.floats(0, 1e300),
+    exposure=st.floats(5e-324, 1e100),
+    background=st.floats(0, 1e100),
     roll=st.floats(-1e6, 1e6),
     ra=st.floats(0, 359.999999),
     dec=st.floats(-90, 90),
-    seed=st.integers(0, 2**80),
+    seed=st.integers(2**63, 2**80),
 )
 def test_any_float_comes_back(tmp_path_factory, exposure, background, roll, ra, dec, seed):
     """Catches a value that travels through decimal text or through 64-bit integers."""
@@ -128,11 +136,8 @@ def test_any_float_comes_back(tmp_path_factory, exposure, background, roll, ra, 
         shape=(2, 3),
     )
     path = tmp_path_factory.getbasetemp() / "any.fits"
-    with np.errstate(over="ignore"):
-        before = exposure_of(observation, seed=seed)
-        if not np.isfinite(before.background):
-            return
-        before.write(path, overwrite=True)
+    before = exposure_of(observation, seed=seed)
+    before.write(path, overwrite=True)
     assert Exposure.read(path) == before
 
 
