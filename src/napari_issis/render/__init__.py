@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..observation import Observation
 from ..psf import RadialPSF
 from ..sources import SourceArrays, check_sources
+from .direct import add_direct, has_sharp_edge
 from .gaussians import decompose
 from .meshes import mesh_rate
 from .optics import Optics
@@ -108,6 +109,9 @@ def _render(
 ) -> Array:
     """Render with an error of at most ``allowed`` cps per pixel."""
     is_point = sources.kind == "point"
+    sharp_edge = has_sharp_edge(
+        optics, 0.1 * allowed / brightest, optics.extent + 50.0, point_area(optics)
+    )
     plan = make_plan(
         optics,
         shape,
@@ -115,6 +119,7 @@ def _render(
         allowed / max(_ring_amplitude(optics, sources, rate), 1e-300),
         int(is_point.sum()),
         int((~is_point).sum()),
+        sharp_edge,
     )
     share = 0.03 * allowed
     is_disc = sources.kind == "uniform"
@@ -128,7 +133,9 @@ def _render(
         plan.cell,
     )
     image = mesh_rate(plan, shape, gaussians, sources.take(is_disc), rate[is_disc], share)
-    if plan.stamps:
+    if sharp_edge:
+        add_direct(image, plan, sources, rate)
+    elif plan.stamps:
         add_stamps(image, plan, sources, rate, share / np.sqrt(len(sources)))
     return image
 

@@ -423,19 +423,18 @@ def _finer(
     to: tuple[tuple[int, int], tuple[int, int]],
 ) -> Array:
     """Interpolate from one mesh to the next finer one."""
-    y = _interpolation(at[0], to[0], plan.taps(), plan.digits)
-    x = _interpolation(at[1], to[1], plan.taps(), plan.digits)
+    y = _interpolation(at[0], to[0], plan.taps(), plan.attenuation())
+    x = _interpolation(at[1], to[1], plan.taps(), plan.attenuation())
     finer: Array = (x @ (y @ values).T).T
     return finer
 
 
 @lru_cache(maxsize=64)
 def _interpolation(
-    at: tuple[int, int], to: tuple[int, int], taps: int, digits: float
+    at: tuple[int, int], to: tuple[int, int], taps: int, attenuation: float
 ) -> sparse.csr_array:
     """Matrix that interpolates halfway between mesh points by a Kaiser-windowed sinc."""
     offset = np.arange(-taps, taps) + 0.5
-    attenuation = 20 / np.log(10) * digits
     beta = signal.kaiser_beta(attenuation)
     weight = np.sinc(offset) * np.i0(beta * np.sqrt(1 - (offset / (taps + 0.5)) ** 2))
     weight /= weight.sum()

@@ -48,7 +48,7 @@ class Plan:
     cell : float
         Cell of the finest mesh, pixels; a power of two.
     stamps : bool
-        Whether frequencies above the finest mesh's band are rendered on stamps.
+        Whether frequencies above the finest mesh's band are left to stamps.
     """
 
     optics: Optics
@@ -99,9 +99,13 @@ class Plan:
 
         Kaiser's estimate for a transition of 1 - 2 BAND cycles per cell.
         """
-        attenuation = 20 / np.log(10) * self.digits
+        attenuation = self.attenuation()
         length = (attenuation - 7.95) / (2.285 * 2 * np.pi * (1 - 2 * BAND))
         return int(np.ceil(length / 2)) + 1
+
+    def attenuation(self) -> float:
+        """Attenuation of that filter in dB; its ripple adds up over the axes and levels."""
+        return float(20 / np.log(10) * (self.digits + 2.5))
 
     def reach(self, level: int) -> float:
         """Distance in pixels to which a level's kernel is felt; level -1 is the stamps'."""
@@ -115,6 +119,7 @@ def make_plan(
     ring_accuracy: float,
     points: int,
     extended: int,
+    sharp_edge: bool = False,
 ) -> Plan:
     """Choose the meshes for a frame and a number of sources, by estimated run time.
 
@@ -130,11 +135,17 @@ def make_plan(
         Error allowed over the amplitude of the sharpest source's rings.
     points, extended : int
         Numbers of sources.
+    sharp_edge : bool
+        Whether the transfer function ends at a sharp edge, see `direct`.
     """
     # a tenth of the error allowed, in quarter steps so that plans are shared
     digits = float(np.ceil(4 * np.log(10 / max(accuracy, 1e-15))) / 4)
     ring_digits = float(np.ceil(2 * np.log(10 / max(ring_accuracy, 1e-15))) / 2)
     highest = max(optics.band_limit(0.1 * np.exp(-digits)), 1e-6)
+    if sharp_edge:
+        # leave room between the meshes' band and the edge
+        cell = 2.0 ** np.ceil(np.log2(BAND / (0.7 * highest)))
+        return Plan(optics, digits, 0.0, max(cell, 0.5), stamps=True)
     finest = 2.0 ** np.floor(np.log2(BAND / highest))
     meshes = Plan(optics, digits, max(ring_digits, 0.0), finest, stamps=False)
     if finest >= 0.5:

@@ -94,8 +94,8 @@ def _point_spectrum(plan: Plan, half: int, reach: int, limit: float) -> Transfer
     """High-passed transfer function on the quadrant (radial) or the full grid of a stamp."""
     grid = _grid(half, reach, limit)
     if plan.optics.radial:
-        return _high_pass(plan, grid.k, grid.k) * grid.weight[:, None] * grid.weight
-    return _high_pass(plan, _both_signs(grid.k), grid.k) * (grid.weight / grid.weight[0]) * (
+        return high_pass(plan, grid.k, grid.k) * grid.weight[:, None] * grid.weight
+    return high_pass(plan, _both_signs(grid.k), grid.k) * (grid.weight / grid.weight[0]) * (
         grid.weight[0] ** 2
     )
 
@@ -104,7 +104,8 @@ def _both_signs(k: Array) -> Array:
     return np.concatenate([-k[:0:-1], k])
 
 
-def _high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
+def high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
+    """Transfer function above the meshes' band, on the grid (ky, kx) in cycles per pixel."""
     k = np.hypot(ky[:, None], kx)
     transfer: Transfer = plan.optics.transfer(ky, kx) * (1 - plan.lowpass(k, 0))
     return transfer
@@ -179,16 +180,16 @@ def _add_extended(
     cos_y, sin_y = _turned(grid_y, one.y - row)
     cos_x, sin_x = _turned(grid_x, one.x - column)
     ky, kx = _both_signs(grid_y.k), grid_x.k
-    transform = _transform(one, ky, kx) * rate
+    profile = transform(one, ky, kx) * rate
     if plan.optics.radial:
         filtered = _quadrant_filter(plan, half_y, half_x, limit)
         count = grid_y.k.size
-        upper, lower = transform[count - 1 :], transform[count - 1 :: -1]
+        upper, lower = profile[count - 1 :], profile[count - 1 :: -1]
         even = 0.5 * (upper + lower) * filtered
         odd = 0.5 * (upper - lower) * filtered
         stamp = _images(even, odd, cos_y, sin_y, cos_x, sin_x)[0]
     else:
-        spectrum = _high_pass(plan, ky, kx) * transform * grid_x.weight * grid_y.weight[0]
+        spectrum = high_pass(plan, ky, kx) * profile * grid_x.weight * grid_y.weight[0]
         stamp = _images(spectrum, None, cos_y, sin_y, cos_x, sin_x)[0]
     _place(image, stamp, row - half_y, column - half_x)
 
@@ -197,12 +198,12 @@ def _add_extended(
 def _quadrant_filter(plan: Plan, half_y: int, half_x: int, limit: float) -> Transfer:
     grid_y, grid_x = _grid(half_y, half_y, limit), _grid(half_x, half_x, limit)
     filtered: Transfer = (
-        _high_pass(plan, grid_y.k, grid_x.k) * grid_y.weight[:, None] * grid_x.weight
+        high_pass(plan, grid_y.k, grid_x.k) * grid_y.weight[:, None] * grid_x.weight
     )
     return filtered
 
 
-def _transform(one: SourceArrays, ky: Array, kx: Array) -> Array:
+def transform(one: SourceArrays, ky: Array, kx: Array) -> Array:
     """Transform of a source's unit-flux profile, centred, on the grid (ky, kx)."""
     q = elliptical_frequency(
         ky, kx, float(one.r_half[0]), float(one.ellipticity[0]), float(one.pa[0])
