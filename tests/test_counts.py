@@ -280,6 +280,23 @@ def test_uniforms_fill_the_open_interval():
     assert stats.kstest(u.ravel(), "uniform").pvalue > 1e-6
 
 
+def test_uniforms_are_never_zero_or_one(monkeypatch):
+    """Catches log(0) and endless sums at the bits that a random frame never holds."""
+
+    class Philox:
+        def __init__(self, **state):
+            pass
+
+        def random_raw(self, n):
+            return np.array([0, 2**64 - 1], np.uint64)
+
+    monkeypatch.setattr(np.random, "Philox", Philox)
+    seed = 123456789  # of no other test: the frame is cached
+    assert pixel_uniforms(seed, (1, 2)).tolist() == [[SMALLEST, LARGEST]]
+    counts = poisson_counts(np.full((1, 2), 10.0), seed)
+    assert counts.tolist() == [[0, 45]]  # mpmath: 1 - CDF(44; 10) > 2^-53 > 1 - CDF(45; 10)
+
+
 def test_zero_and_next_to_zero():
     for u in (SMALLEST, 0.5, LARGEST):
         assert one(u, 0.0) == one(u, -0.0) == one(u, 5e-324) == one(u, 1e-16) == 0
