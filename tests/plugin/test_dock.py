@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -173,9 +174,10 @@ def test_the_menu_makes_a_scene_in_its_viewer(make_napari_viewer_proxy, npe2pm):
         ]
         scene = scene_of(viewer)
         assert widget.scene is scene
+        scene.observation = SMALL
         widget.sources.button.native.click()
         scene.wait()
-        assert scene.exposure == simulate(source("exponential", 256, 256))
+        assert scene.exposure == simulate(source("exponential", 256, 256), SMALL)
         assert open_scene(viewer=viewer) is scene
         assert len(viewer.window.dock_widgets) == 1
 
@@ -184,6 +186,11 @@ def test_open_sample_gives_a_live_scene(make_napari_viewer, npe2pm, qtbot, monke
     """Catches samples that are dead pictures, and a scene lost without a question."""
     viewer = make_napari_viewer()
     monkeypatch.setattr(samples.napari, "current_viewer", lambda: viewer)
+    small = {
+        "q2237": replace(example_scene("q2237"), sources=few_sources(), observation=SMALL),
+        "blend": replace(example_scene("blend"), observation=SMALL.replace(channel="FUV")),
+    }
+    monkeypatch.setattr(samples, "example_scene", small.get)
     asked = []
     monkeypatch.setattr(samples, "_may_replace", lambda count: asked.append(count) or False)
     with npe2pm.tmp_plugin(manifest=PluginManifest.from_file(ROOT / "napari.yaml")):
@@ -192,19 +199,18 @@ def test_open_sample_gives_a_live_scene(make_napari_viewer, npe2pm, qtbot, monke
         qtbot.waitUntil(lambda: scene_of(viewer) is not None, timeout=5000)
         scene = scene_of(viewer)
         scene.wait()
-        example = example_scene("q2237")
-        assert scene.exposure == simulate(example.sources, example.observation)
+        assert scene.exposure == simulate(few_sources(), SMALL)
         assert scene.layers == list(viewer.layers)
         viewer.open_sample("napari-issis", "blend")
-        qtbot.waitUntil(lambda: asked == [5], timeout=5000)
+        qtbot.waitUntil(lambda: asked == [4], timeout=5000)
         assert len(viewer.layers) == 3
-        assert len(scene.sources) == 5
+        assert len(scene.sources) == 4
         monkeypatch.setattr(samples, "_may_replace", lambda count: True)
         viewer.open_sample("napari-issis", "blend")
         qtbot.waitUntil(lambda: len(viewer.layers) == 3, timeout=5000)
         scene.wait()
         assert len(scene.sources) == 2
-        assert scene.observation == example_scene("blend").observation
+        assert scene.observation == SMALL.replace(channel="FUV")
 
 
 def test_each_builtin_scene_is_a_sample():

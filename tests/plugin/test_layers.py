@@ -183,7 +183,7 @@ def test_points_take_the_exact_position():
     """Catches x and y exchanged, and points that move though they were not touched."""
     table = master_table(source("point", 1 / 3, 2 / 3))
     data = points_data(table)
-    moved = data + [[1.25, 10.0]]
+    moved = data + np.array([1.25, 10.0])
     after = adopt_points(table, data, moved)
     assert (after["x"][0], after["y"][0]) == (1 / 3 + 10.0, 2 / 3 + 1.25)
     assert np.array_equal(values(adopt_points(table, data, data)), values(table))

@@ -16,7 +16,8 @@ from ..render import count_rate
 
 Array = NDArray[np.float64]
 
-# Largest error of the moved sources while the mouse moves, over their peak.
+# Largest error of the moved sources while the mouse moves, over their peak: no more than the
+# sky, and one set of filters serves the renderer for the whole drag.
 PREVIEW_TOLERANCE = 1e-6
 
 
@@ -98,7 +99,7 @@ class PictureMaker:
             if not moving.any():
                 return whole
             if 2 * moving.sum() <= moving.size:
-                part, _ = noise_ready_rate(drag.sources[moving], observation)
+                part = count_rate(drag.sources[moving], observation, tolerance=PREVIEW_TOLERANCE)
                 return np.maximum(whole - part, 0.0)
         return noise_ready_rate(drag.sources[~moving], observation)[0]
 

@@ -292,8 +292,8 @@ class Scene:
             self._pause.stop()
             self._request_final()
         elif self._requested[0] != self._version:
+            self._pause.stop()
             self._request_preview(drag)
-            self._pause.start()
 
     def _request_final(self) -> None:
         ticket = (self._version, True)
@@ -336,6 +336,9 @@ class Scene:
             self.viewer.reset_view()
         if picture.final:
             self.events.picture()
+        elif self._shown[0] == self._version:
+            # The mouse rests: when it does so for long, show what the drag would end with.
+            self._pause.start()
 
     def _failed(self, error: BaseException) -> None:
         # The last good picture stays.
