@@ -1,0 +1,253 @@
+"""The renderer against real-space quadrature, and what must hold of any scene."""
+
+import numpy as np
+import pytest
+from astropy.table import vstack
+from quadrature import rate as quadrature_rate
+from scipy import integrate, special
+
+import napari_issis as ni
+from napari_issis.render import render
+
+CPS = 1.14e17  # NUV, the paper's
+PIXEL = 0.036
+SIGMA_PER_FWHM = 1 / 2.3548200450309493
+INDEX = {"gaussian": 0.5, "exponential": 1.0, "devaucouleurs": 4.0}
+
+
+def random_scene(seed):
+    """A small random scene, frame and Gaussian PSF, sources outside the frame included."""
+    rng = np.random.default_rng(seed)
+    shape = tuple(int(n) for n in rng.integers(1, 40, 2))
+    fwhm = np.exp(rng.uniform(np.log(0.8), np.log(15)))
+    scene = []
+    for kind in rng.choice(
+        ["point", "uniform", "gaussian", "exponential", "devaucouleurs", "sersic"],
+        rng.integers(1, 6),
+    ):
+        scene.append(
+            (
+                10 ** rng.uniform(-16, -14),
+                str(kind),
+                rng.uniform(-8, shape[1] + 8),
+                rng.uniform(-8, shape[0] + 8),
+                np.exp(rng.uniform(np.log(0.05), np.log(6))),
+                rng.uniform(0, 0.75) * (rng.random() < 0.8),
+                rng.uniform(-200, 400),
+                rng.uniform(0.5, 8),
+            )
+        )
+    # one source in the frame, so that the image's peak is not that of a far wing
+    scene[0] = (*scene[0][:2], rng.uniform(0, shape[1] - 1), rng.uniform(0, shape[0] - 1), *scene[0][4:])
+    return shape, fwhm, scene
+
+
+def table_of(scene):
+    return vstack(
+        [
+            ni.source(kind, x, y, flux, r, e, pa, n=n if kind == "sersic" else None)
+            for flux, kind, x, y, r, e, pa, n in scene
+        ]
+    )
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_random_scenes_keep_the_tolerance(seed):
+    """Catches, in any profile: sign of PA, axes, half-light constant, half a pixel, the sinc."""
+    tolerance = [1e-3, 1e-6, 1e-8][seed % 3]
+    shape, fwhm, scene = random_scene(seed)
+    observation = ni.Observation(shape=shape, psf=ni.GaussianPSF(fwhm * PIXEL))
+    image = ni.count_rate(table_of(scene), observation, tolerance=tolerance)
+    rng = np.random.default_rng(1000 + seed)
+    pixels = {tuple(int(i) for i in np.unravel_index(image.argmax(), shape))}
+    pixels |= {tuple(int(rng.integers(n)) for n in shape) for _ in range(3)}
+    pixels |= {(0, 0), (shape[0] - 1, shape[1] - 1)}
+    pixels = sorted(pixels)
+    expected = np.zeros(len(pixels))
+    for flux, kind, x, y, r, e, pa, n in scene:
+        one = (kind, x, y, r, e, pa, INDEX.get(kind, n))
+        expected += flux * CPS * quadrature_rate(one, pixels, fwhm * SIGMA_PER_FWHM)
+    got = np.array([image[p] for p in pixels])
+    assert np.abs(got - expected).max() <= tolerance * image.max()
+
+
+@pytest.mark.parametrize("obscuration", [0.0, 0.35])
+def test_bare_diffraction_star(obscuration):
+    """Star through a bare annulus: pixel integrals of the closed-form Airy pattern.
+
+    Catches a wrong cut-off, obscuration taken by area instead of by diameter, a missing sinc.
+    """
+    wavelength, diameter = 2500e-10, 1.7
+    x, y = 15.3, 11.8
+    observation = ni.Observation(
+        shape=(24, 32), psf=ni.TelescopePSF(diameter, obscuration, wavelength * 1e10)
+    )
+    image = ni.count_rate(ni.source("point", x, y, 1e-14), observation, tolerance=1e-6)
+    per_pixel = np.pi * diameter / wavelength * np.radians(PIXEL / 3600)
+
+    def airy(dy, dx):
+        v = np.maximum(np.hypot(dy, dx) * per_pixel, 1e-9)
+        amplitude = 2 * special.j1(v) / v
+        if obscuration:
+            w = obscuration * v
+            amplitude = amplitude - obscuration**2 * 2 * special.j1(w) / w
+        return (amplitude / (1 - obscuration**2)) ** 2 * per_pixel**2 * (1 - obscuration**2) / (4 * np.pi)
+
+    node, weight = np.polynomial.legendre.leggauss(24)
+    for py, px in [(12, 15), (11, 16), (14, 15), (0, 0), (23, 31), (12, 25)]:
+        values = airy((py + 0.5 * node - y)[:, None], px + 0.5 * node - x)
+        expected = 1e-14 * CPS * 0.25 * weight @ values @ weight
+        assert abs(image[py, px] - expected) <= 1e-6 * image.max()
+
+
+def test_image_psf_is_sinc_interpolated():
+    """Undersampled, pixel included: products of sincs, exactly (catches wrapping of 1/x ripples)."""
+    rng = np.random.default_rng(3)
+    samples = rng.uniform(0, 1, (5, 7))
+    samples /= samples.sum()
+    observation = ni.Observation(
+        shape=(30, 41), psf=ni.ImagePSF(samples, PIXEL, includes_pixel=True)
+    )
+    stars = ni.random_sources("point", 4, shape=(30, 41), seed=1)
+    expected = np.zeros((30, 41))
+    for star in stars:
+        in_y = np.sinc(np.arange(30)[:, None] - star["y"] - (np.arange(5) - 2))
+        in_x = np.sinc(np.arange(41)[:, None] - star["x"] - (np.arange(7) - 3))
+        expected += star["flux"].value * CPS * in_y @ samples @ in_x.T
+    image = ni.count_rate(stars, observation, tolerance=1e-7)
+    assert np.abs(image - expected).max() <= 1e-7 * expected.max()
+
+
+def test_asymmetric_oversampled_image_psf():
+    """Two displaced Gaussians as an image, against shifted scenes (catches a mirrored PSF)."""
+    fwhm, scale, n = 0.05, PIXEL / 4, 61
+    line = np.exp(-0.5 * ((np.arange(n) - n // 2) * scale / (fwhm * SIGMA_PER_FWHM)) ** 2)
+    round_ = np.outer(line, line)
+    # 2 pixels up and 1 to the left of the main one
+    samples = 0.7 * round_ + 0.3 * np.roll(round_, (8, -4), axis=(0, 1))
+    scene = vstack(
+        [
+            ni.random_sources("point", 4, shape=(40, 50), seed=1),
+            ni.random_sources("devaucouleurs", 3, shape=(40, 50), r_half=(0.3, 8), seed=2),
+            ni.random_sources("uniform", 2, shape=(40, 50), r_half=(0.3, 8), seed=3),
+        ]
+    )
+    shifted = scene.copy()
+    shifted["y"] += 2
+    shifted["x"] -= 1
+    gaussian = ni.Observation(shape=(40, 50), psf=ni.GaussianPSF(fwhm))
+    expected = 0.7 * ni.count_rate(scene, gaussian, tolerance=1e-9)
+    expected += 0.3 * ni.count_rate(shifted, gaussian, tolerance=1e-9)
+    image = ni.count_rate(scene, gaussian.replace(psf=ni.ImagePSF(samples, scale)), tolerance=1e-6)
+    assert np.abs(image - expected).max() <= 1e-6 * expected.max()
+
+
+def test_image_psf_is_normalised():
+    one = ni.ImagePSF(np.full((5, 5), 7.0), PIXEL)
+    assert one.array.sum() == pytest.approx(1, rel=1e-15)
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    return vstack(
+        [
+            ni.random_sources("point", 5, shape=(48, 64), seed=1),
+            ni.random_sources("exponential", 3, shape=(48, 64), r_half=(2, 9), seed=2),
+            ni.random_sources("sersic", 2, shape=(48, 64), r_half=(2, 9), seed=3),
+            ni.random_sources("uniform", 2, shape=(48, 64), r_half=(2, 9), seed=4),
+        ]
+    )
+
+
+@pytest.fixture(scope="module")
+def observation():
+    return ni.Observation(shape=(48, 64))
+
+
+def test_superposition(mixed, observation):
+    whole = ni.count_rate(mixed, observation, tolerance=1e-8)
+    parts = sum(ni.count_rate(mixed[i : i + 4], observation, tolerance=1e-8) for i in (0, 4, 8))
+    assert np.abs(whole - parts).max() <= 2e-8 * whole.max()
+
+
+def test_half_turn(mixed, observation):
+    turned = mixed.copy()
+    turned["x"] = 63 - turned["x"]
+    turned["y"] = 47 - turned["y"]
+    first = ni.count_rate(mixed, observation, tolerance=1e-8)
+    second = ni.count_rate(turned, observation, tolerance=1e-8)
+    assert np.abs(first[::-1, ::-1] - second).max() <= 2e-8 * first.max()
+
+
+def test_whole_pixel_shift(mixed, observation):
+    """Catches rounding of positions and effects of the frame's edge."""
+    moved = mixed.copy()
+    moved["x"] += 3
+    moved["y"] -= 5
+    first = ni.count_rate(mixed, observation, tolerance=1e-8)
+    second = ni.count_rate(moved, observation, tolerance=1e-8)
+    assert np.abs(first[5:, :-3] - second[:-5, 3:]).max() <= 2e-8 * first.max()
+
+
+def test_flux_arrives():
+    """Light of a compact source in a large frame; a de Vaucouleurs galaxy's share by its growth."""
+    observation = ni.Observation(shape=(301, 301), psf=ni.GaussianPSF(0.1))
+    star = ni.count_rate(ni.source("point", 150, 150, 1e-14), observation)
+    assert star.sum() == pytest.approx(1e-14 * CPS, rel=1e-6)
+    galaxy = ni.count_rate(
+        ni.source("devaucouleurs", 150, 150, 1e-14, 4.0, 0.0), observation, tolerance=1e-9
+    )
+    b = special.gammaincinv(8, 0.5)
+
+    def share(theta):  # light inside the square frame, by the enclosed flux along each direction
+        radius = 150.5 / max(abs(np.cos(theta)), abs(np.sin(theta)))
+        return special.gammainc(8, b * (radius / 4.0) ** 0.25) / (2 * np.pi)
+
+    expected = 8 * integrate.quad(share, 0, np.pi / 4)[0]
+    assert galaxy.sum() / (1e-14 * CPS) == pytest.approx(expected, rel=1e-6)
+
+
+def test_moffat_wings_reach_far():
+    """A star outside the frame: only the wing, (r/a)^(-2 beta), is in it."""
+    psf = ni.MoffatPSF(0.1, 2.5)
+    observation = ni.Observation(shape=(8, 8), psf=psf)
+    image = ni.count_rate(ni.source("point", 400.0, 4.0, 1e-14), observation, tolerance=1e-4)
+    a = 0.1 / (2 * np.sqrt(2 ** (1 / 2.5) - 1)) / PIXEL
+    expected = 1e-14 * CPS * 1.5 / (np.pi * a**2) * (1 + ((400 - 4) / a) ** 2) ** -2.5
+    assert image[4, 4] == pytest.approx(expected, rel=2e-4)
+
+
+def test_nothing_gives_exact_zeros():
+    empty = ni.random_sources("point", 0)
+    dark = ni.random_sources("exponential", 3, flux=(0, 0))
+    far = ni.source("gaussian", 1e9, 0.0, 1e-14)
+    observation = ni.Observation(shape=(20, 30))
+    for table in (empty, dark):
+        image = ni.count_rate(table, observation)
+        assert image.shape == (20, 30)
+        assert not image.any()
+    assert np.abs(ni.count_rate(far, observation.replace(psf=ni.GaussianPSF(0.1)))).max() < 1e-11
+
+
+def test_filters_and_channel_scale_the_rate():
+    star = ni.source("point", 10, 10, 1e-14)
+    open_ = ni.Observation(shape=(21, 21), psf=ni.GaussianPSF(0.1))
+    dimmed = ni.count_rate(star, open_.replace(filters=("NF1", "NF2")))
+    assert dimmed == pytest.approx(1e-3 * ni.count_rate(star, open_), rel=1e-12)
+    fuv = ni.count_rate(star, open_.replace(channel="FUV"))
+    assert fuv.sum() / ni.count_rate(star, open_).sum() == pytest.approx(3.36e15 / 1.14e17)
+
+
+def test_tighter_for_the_sky():
+    """1e-6 of a bright star's peak is as much as the sky: the second demand is kept."""
+    star = ni.source("point", 30.2, 30.7, 1e-14)
+    observation = ni.Observation(shape=(64, 64))
+    exact = ni.count_rate(star, observation, tolerance=1e-11)
+    tight = render(star, observation, tolerance=1e-2, absolute=3.5e-6, floor=1e-10)
+    assert np.abs(tight - exact).max() <= 3.5e-6
+
+
+@pytest.mark.parametrize("tolerance", [0, -1e-6, 1, 1e-13, np.nan])
+def test_bad_tolerance(tolerance):
+    with pytest.raises(ValueError, match="tolerance is"):
+        ni.count_rate(ni.source("point", 1, 1), tolerance=tolerance)
