@@ -103,14 +103,14 @@ CHANNELS = MappingProxyType(
             cps_per_flux=3.36e15,  # [P]
             sky=Sky(total=4.9e-3, earthshine_and_zodiacal=7.2e-12),  # [P]
             # blur by pointing and detector chosen for about 0.10 arcsec FWHM in all [A]
-            psf=TelescopePSF(DIAMETER, OBSCURATION, band=(1150.0, 1750.0), blur_fwhm=0.098),
+            psf=TelescopePSF(DIAMETER, OBSCURATION, band=(1150.0, 1750.0), blur_fwhm=0.0945),
         ),
         "NUV": Channel(
             name="NUV",
             band=(1850.0, 3200.0),  # [P]
             cps_per_flux=1.14e17,  # [P]
             sky=Sky(total=3.5e-4, earthshine_and_zodiacal=2.1e-5),  # [P]
-            psf=TelescopePSF(DIAMETER, OBSCURATION, band=(1850.0, 3200.0), blur_fwhm=0.095),
+            psf=TelescopePSF(DIAMETER, OBSCURATION, band=(1850.0, 3200.0), blur_fwhm=0.0888),
         ),
     }
 )

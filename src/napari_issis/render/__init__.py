@@ -38,8 +38,8 @@ def count_rate(
         The instrument set-up, by default the paper's.
     tolerance : float
         Largest error of any pixel over the image's largest pixel, 1e-12 to 0.1. Where only
-        the wings of sources are in the frame the error is not below 1e-14 of the brightest
-        source's own peak.
+        the wings of sources are in the frame, the error is not below 1e-14 of the brightest
+        source's own peak (1e-10 for the diffraction rings of a `TelescopePSF`).
 
     Returns
     -------
@@ -86,7 +86,7 @@ def render(
     inside = (np.abs(arrays.y - 0.5 * (observation.shape[0] - 1)) <= 0.5 * observation.shape[0]) & (
         np.abs(arrays.x - 0.5 * (observation.shape[1] - 1)) <= 0.5 * observation.shape[1]
     )
-    peak = float(own_peak[inside].max(initial=0.0)) or 1e-6 * float(own_peak.max())
+    peak = float(own_peak[inside].max(initial=0.0)) or float(own_peak.max())
     while True:
         allowed = tolerance * peak
         if absolute is not None:

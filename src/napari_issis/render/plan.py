@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 
 # highest frequency used on a mesh, cycles per cell (0.5 would be its Nyquist frequency)
 BAND = 0.35
+# Rings fainter than this, over the peak of the source that makes them, are not followed: they
+# reach over thousands of pixels.
+FAINTEST_RINGS = 1e-10
 # points of a mesh (0.4 GB) above which stamps are preferred
 LARGEST_MESH = 5e7
 
@@ -140,7 +143,7 @@ def make_plan(
     """
     # a tenth of the error allowed, in quarter steps so that plans are shared
     digits = float(np.ceil(4 * np.log(10 / max(accuracy, 1e-15))) / 4)
-    ring_digits = float(np.ceil(2 * np.log(10 / max(ring_accuracy, 1e-15))) / 2)
+    ring_digits = float(np.ceil(2 * np.log(10 / max(ring_accuracy, FAINTEST_RINGS))) / 2)
     highest = max(optics.band_limit(0.1 * np.exp(-digits)), 1e-6)
     if sharp_edge:
         # leave room between the meshes' band and the edge
