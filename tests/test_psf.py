@@ -25,9 +25,7 @@ def test_gaussian_and_moffat_transforms(k):
     assert ni.GaussianPSF(0.1).otf(k) == pytest.approx(gaussian, abs=1e-9)
     beta = 3.0
     a = 0.1 / (2 * np.sqrt(2 ** (1 / beta) - 1))
-    moffat = hankel(
-        lambda r: (beta - 1) / (np.pi * a**2) * (1 + (r / a) ** 2) ** -beta, k, 20
-    )
+    moffat = hankel(lambda r: (beta - 1) / (np.pi * a**2) * (1 + (r / a) ** 2) ** -beta, k, 20)
     assert ni.MoffatPSF(0.1, beta).otf(k) == pytest.approx(moffat, abs=1e-7)
 
 
@@ -59,9 +57,7 @@ def test_band_average_is_weighted_by_photons(k):
     """Catches weights by energy or none, and the wrong end of the band as the cut-off."""
     low, high = 1850.0, 3200.0
     wavelength = np.linspace(low, high, 40001)
-    values = [
-        float(ni.TelescopePSF(1.7, 0.33, float(w)).otf(k)) * w for w in wavelength[::40]
-    ]
+    values = [float(ni.TelescopePSF(1.7, 0.33, float(w)).otf(k)) * w for w in wavelength[::40]]
     expected = integrate.simpson(values, x=wavelength[::40]) / (0.5 * (high**2 - low**2))
     assert ni.TelescopePSF(1.7, 0.33, (low, high)).otf(k) == pytest.approx(expected, abs=3e-7)
 

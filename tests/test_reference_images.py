@@ -18,7 +18,9 @@ NAMES = sorted(path.stem for path in DATA.glob("*.npz"))
 
 def load(name):
     with np.load(DATA / f"{name}.npz") as data:
-        table = QTable({c: data[c] for c in ("kind", "x", "y", "flux", "r_half", "ellipticity", "pa")})
+        table = QTable(
+            {c: data[c] for c in ("kind", "x", "y", "flux", "r_half", "ellipticity", "pa")}
+        )
         psf = {
             "telescope": lambda: ni.TelescopePSF(
                 float(data["diameter"]),

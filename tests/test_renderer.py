@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from astropy.table import vstack
-from quadrature import rate as quadrature_rate
 from scipy import integrate, special
 
 import napari_issis as ni
 from napari_issis.render import render
+from quadrature import rate as quadrature_rate
 
 CPS = 1.14e17  # NUV, the paper's
 PIXEL = 0.036
@@ -38,7 +38,12 @@ def random_scene(seed):
             )
         )
     # one source in the frame, so that the image's peak is not that of a far wing
-    scene[0] = (*scene[0][:2], rng.uniform(0, shape[1] - 1), rng.uniform(0, shape[0] - 1), *scene[0][4:])
+    scene[0] = (
+        *scene[0][:2],
+        rng.uniform(0, shape[1] - 1),
+        rng.uniform(0, shape[0] - 1),
+        *scene[0][4:],
+    )
     return shape, fwhm, scene
 
 
@@ -91,7 +96,12 @@ def test_bare_diffraction_star(obscuration):
         if obscuration:
             w = obscuration * v
             amplitude = amplitude - obscuration**2 * 2 * special.j1(w) / w
-        return (amplitude / (1 - obscuration**2)) ** 2 * per_pixel**2 * (1 - obscuration**2) / (4 * np.pi)
+        return (
+            (amplitude / (1 - obscuration**2)) ** 2
+            * per_pixel**2
+            * (1 - obscuration**2)
+            / (4 * np.pi)
+        )
 
     node, weight = np.polynomial.legendre.leggauss(24)
     for py, px in [(12, 15), (11, 16), (14, 15), (0, 0), (23, 31), (12, 25)]:
@@ -101,7 +111,7 @@ def test_bare_diffraction_star(obscuration):
 
 
 def test_image_psf_is_sinc_interpolated():
-    """Undersampled, pixel included: products of sincs, exactly (catches wrapping of 1/x ripples)."""
+    """Undersampled, pixel included: products of sincs (catches wrapping of 1/x ripples)."""
     rng = np.random.default_rng(3)
     samples = rng.uniform(0, 1, (5, 7))
     samples /= samples.sum()

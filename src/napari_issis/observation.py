@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from math import isfinite
-from numbers import Integral
 from typing import Any
 
-import numpy as np
 from astropy.coordinates import SkyCoord
 
 from .instrument import CHANNELS, FILTERS, PIXEL_SCALE, Channel
@@ -135,7 +132,7 @@ class Observation:
         """Arcsec per pixel."""
         return PIXEL_SCALE
 
-    def _key(self) -> tuple[Hashable, ...]:
+    def _key(self) -> tuple[object, ...]:
         position = None
         if self.pointing is not None:
             position = (float(self.pointing.ra.deg), float(self.pointing.dec.deg))
@@ -175,6 +172,6 @@ def _shape(shape: Any) -> tuple[int, int]:
     except (TypeError, ValueError):
         raise ValueError(f"shape is {shape!r}; give (ny, nx) in pixels.") from None
     for n in (ny, nx):
-        if not isinstance(n, Integral | np.integer) or isinstance(n, bool) or not 1 <= n <= 16384:
+        if isinstance(n, bool) or not hasattr(n, "__index__") or not 1 <= n <= 16384:
             raise ValueError(f"shape is {shape!r}; sides are whole numbers from 1 to 16384.")
     return int(ny), int(nx)

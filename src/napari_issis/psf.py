@@ -36,13 +36,15 @@ class PSF(Protocol):
     """
 
     @property
-    def includes_pixel(self) -> bool: ...
+    def includes_pixel(self) -> bool:
+        """Whether the OTF holds the transform of the detector pixel."""
 
     @property
-    def extent(self) -> float: ...
+    def extent(self) -> float:
+        """Half-size in arcsec beyond which the PSF is zero."""
 
     def band_limit(self, threshold: float) -> float:
-        """Frequency in cycles per arcsec beyond which \\|OTF\\| <= threshold on both axes."""
+        """Frequency in cycles per arcsec beyond which the OTF's modulus is at most ``threshold``."""
 
     def otf_grid(self, fy: Array, fx: Array) -> NDArray[np.complexfloating] | Array:
         """OTF on the grid of frequencies (fy, fx), shape (len(fy), len(fx))."""
@@ -82,7 +84,7 @@ class RadialPSF:
         return np.inf
 
     def band_limit(self, threshold: float) -> float:
-        """Frequency in cycles per arcsec beyond which \\|OTF\\| <= threshold."""
+        """Frequency in cycles per arcsec beyond which the OTF's modulus is at most ``threshold``."""
         if threshold >= 1:
             return 0.0
         low, high = 0.0, 1.0
@@ -208,27 +210,31 @@ class TelescopePSF(RadialPSF):
             float(limits[0]) if limits[0] == limits[-1] else (float(limits[0]), float(limits[1])),
         )
 
+    @property
+    def band_limits(self) -> tuple[float, float]:
+        """Lower and upper limit of the band, angstrom; equal for one wavelength."""
+        return self.band if isinstance(self.band, tuple) else (self.band, self.band)
+
     def cutoff(self) -> float:
         """Highest frequency that the aperture passes: diameter / shortest wavelength."""
-        shortest = self.band if isinstance(self.band, float) else self.band[0]
-        return self.diameter / (shortest * 1e-10) / ARCSEC_PER_RADIAN
+        return self.diameter / (self.band_limits[0] * 1e-10) / ARCSEC_PER_RADIAN
 
     def first_edge(self) -> float:
         """Where the overlap of the two rims begins: (1 - obscuration) / 2 of the cut-off."""
-        longest = self.band if isinstance(self.band, float) else self.band[1]
-        cutoff = self.diameter / (longest * 1e-10) / ARCSEC_PER_RADIAN
+        cutoff = self.diameter / (self.band_limits[1] * 1e-10) / ARCSEC_PER_RADIAN
         return cutoff if self.obscuration == 0 else 0.5 * (1 - self.obscuration) * cutoff
 
     def otf(self, k: ArrayLike) -> Array:
         """Annular OTF, averaged over the band, times the blur's."""
-        k = np.abs(np.asarray(k, dtype=float))
-        if isinstance(self.band, float):
-            value = annular_otf(k / self.cutoff(), self.obscuration)
+        frequency: Array = np.abs(np.asarray(k, dtype=float))
+        low, high = self.band_limits
+        value: Array
+        if low == high:
+            value = annular_otf(frequency / self.cutoff(), self.obscuration)
         else:
-            value = _band_otf(self.obscuration, self.band[1] / self.band[0])(
-                np.minimum(k / self.cutoff(), 1.0)
-            )
-        return value * _gaussian_otf(k, self.blur_fwhm) if self.blur_fwhm else value
+            relative = np.minimum(frequency / self.cutoff(), 1.0)
+            value = _band_otf(self.obscuration, high / low)(relative)
+        return value * _gaussian_otf(frequency, self.blur_fwhm) if self.blur_fwhm else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,7 +265,9 @@ class ImagePSF:
     def __post_init__(self) -> None:
         array = np.array(self.array, dtype=np.float64, order="C", copy=True)
         if array.ndim != 2 or array.size == 0:
-            raise ValueError(f"a PSF image has two dimensions; this array's shape is {array.shape}.")
+            raise ValueError(
+                f"a PSF image has two dimensions; this array's shape is {array.shape}."
+            )
         if not np.all(np.isfinite(array)):
             bad = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
             raise ValueError(f"the PSF image holds {array[bad]} at [y, x] = {list(bad)}.")
@@ -327,10 +335,10 @@ class ImagePSF:
     @property
     def extent(self) -> float:
         """Half-size of the array, arcsec."""
-        return 0.5 * max(self.array.shape) * self.pixel_scale
+        return float(0.5 * max(self.array.shape) * self.pixel_scale)
 
     def band_limit(self, threshold: float) -> float:
-        """Frequency in cycles per arcsec beyond which \\|OTF\\| <= threshold on both axes."""
+        """Frequency in cycles per arcsec beyond which the OTF's modulus is at most ``threshold``."""
         nyquist = 0.5 / self.pixel_scale
         f = np.linspace(-nyquist, nyquist, 4 * max(self.array.shape) + 1)
         above = np.abs(self.otf_grid(f, f)) > threshold
@@ -341,7 +349,7 @@ class ImagePSF:
         return float(min(reach + step, nyquist)) if reach > 0 or threshold < 1 else 0.0
 
     def otf_grid(self, fy: Array, fx: Array) -> NDArray[np.complexfloating]:
-        """Transform of the sinc-interpolated samples: their Fourier series inside the Nyquist box."""
+        """Transform of the interpolated samples: their Fourier series inside the Nyquist box."""
         ny, nx = self.array.shape
         row = _phases(fy, ny, self.pixel_scale)
         column = _phases(fx, nx, self.pixel_scale)
@@ -441,7 +449,8 @@ def _band_otf(obscuration: float, ratio: float) -> CubicSpline:
 
 def _gaussian_otf(k: ArrayLike, fwhm: float) -> Array:
     sigma = fwhm / FWHM_PER_SIGMA
-    return np.exp(-2 * (np.pi * sigma * np.asarray(k, dtype=float)) ** 2)
+    value: Array = np.exp(-2 * (np.pi * sigma * np.asarray(k, dtype=float)) ** 2)
+    return value
 
 
 def _phases(f: Array, n: int, step: float) -> NDArray[np.complexfloating]:

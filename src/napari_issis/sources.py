@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import astropy.units as u
@@ -162,7 +161,7 @@ def random_sources(
     ValueError
         If a limit is out of range or a pair is in the wrong order.
     """
-    if not isinstance(n, Integral | np.integer) or isinstance(n, bool) or n < 0:
+    if isinstance(n, bool) or not hasattr(n, "__index__") or n < 0:
         raise ValueError(f"n is {n!r}; the number of sources is a whole number, 0 or more.")
     if kind not in KINDS:
         raise ValueError(f"kind is {kind!r}; known: {', '.join(KINDS)}.")
@@ -344,4 +343,6 @@ def _require(
     name: str, values: Array, good: NDArray[np.bool_], used: NDArray[np.bool_], allowed: str
 ) -> None:
     for row in np.flatnonzero(used & ~good):
-        raise ValueError(f"row {row}, {name}: {values[row]:g} is not allowed; it must be {allowed}.")
+        raise ValueError(
+            f"row {row}, {name}: {values[row]:g} is not allowed; it must be {allowed}."
+        )

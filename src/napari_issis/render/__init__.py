@@ -28,7 +28,7 @@ SMALLEST_TOLERANCE = 1e-12
 def count_rate(
     sources: Table, observation: Observation | None = None, *, tolerance: float = 1e-6
 ) -> Array:
-    """Expected count rate of the sources alone, after filters and PSF, without sky.
+    """Compute the expected count rate of the sources alone, after filters and PSF, without sky.
 
     Parameters
     ----------

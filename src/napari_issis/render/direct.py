@@ -39,7 +39,7 @@ def has_sharp_edge(optics: Optics, accuracy: float, reach: float, area: float) -
         float(np.abs(optics.transfer(inside, k)).sum()),
         float(np.abs(optics.transfer(k, inside)).sum()),
     ) * (k[1] - k[0])
-    return along * area / (np.pi * reach) > accuracy
+    return bool(along * area / (np.pi * reach) > accuracy)
 
 
 def add_direct(image: Array, plan: Plan, sources: SourceArrays, rate: Array) -> None:

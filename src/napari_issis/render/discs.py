@@ -63,7 +63,7 @@ def paint_discs(
 
 
 def _patch(centre: float, half: float, start: float, cell: float) -> tuple[int, int]:
-    """Number of mesh points about a centre and the index of the first."""
+    """Return the number of mesh points about a centre and the index of the first."""
     first = int(np.floor((centre - half - start) / cell))
     need = int(np.ceil((centre + half - start) / cell)) - first + 1
     return int(fft.next_fast_len(need, real=True)), first

@@ -7,11 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, signal, sparse
+from scipy import fft
 
 from ..sources import SourceArrays
 from .discs import disc_half_sizes, paint_discs
 from .gaussians import Gaussians
+from .interpolation import Span, add_up, spans
 from .optics import Transfer
 from .painting import paint
 from .plan import Plan
@@ -36,7 +37,26 @@ class Axis:
     start: float
     count: int
     content: Interval
-    frame: tuple[int, int]
+    frame: Span
+
+
+@dataclass(frozen=True, eq=False)
+class Density:
+    """Density passed on to the next level, on that level's mesh points in two intervals."""
+
+    values: Array
+    intervals: tuple[Interval, Interval]
+
+
+@dataclass(frozen=True, eq=False)
+class _Content:
+    """What a mesh is painted with."""
+
+    plain: Gaussians
+    spread: Gaussians
+    discs: SourceArrays
+    disc_rate: Array
+    passed: Density | None
 
 
 def mesh_rate(
@@ -78,44 +98,31 @@ def mesh_rate(
     top = max(int(level_of.max(initial=0)), int(disc_level.max(initial=0)))
     while _wings(plan, top, shape, total) > allowed:
         top += 1
-    results = []
-    passed: Array | None = None
-    passed_axes: tuple[Interval, Interval] | None = None
-    frame = [(0, n - 1) for n in shape]
-    if plan.cell_size(0) < 1:
-        scale = round(1 / plan.cell_size(0))
-        frame = [(0, (n - 1) * scale) for n in shape]
-    else:
-        for _ in range(round(np.log2(plan.cell_size(0)))):
-            frame = [_coarser(f, plan.taps()) for f in frame]
-    frames = []
-    for level in range(top + 1):
-        if level:
-            # below one pixel the meshes are folded to the pixels' own rate
-            taps = plan.taps() if plan.cell_size(level) > 1 else 0
-            frame = [_coarser(f, taps) for f in frame]
-        frames.append(tuple(frame))
-        mine = level_of == level
-        here = _Level(
+    results: list[Array | None] = []
+    passed: Density | None = None
+    for level, frame in enumerate(spans(plan, shape, top + 1)):
+        mine, my_discs = level_of == level, disc_level == level
+        mesh = _Mesh(
             plan,
             level,
-            top,
-            (frame[0], frame[1]),
-            gaussians.take(mine & plain),
-            gaussians.take(mine & ~plain),
-            discs.take(disc_level == level),
-            disc_rate[disc_level == level],
-            passed,
-            passed_axes,
+            level == top,
+            frame,
+            _Content(
+                plain=gaussians.take(mine & plain),
+                spread=gaussians.take(mine & ~plain),
+                discs=discs.take(my_discs),
+                disc_rate=disc_rate[my_discs],
+                passed=passed,
+            ),
         )
-        if here.empty:
+        if mesh.empty:
             results.append(None)
             continue
-        spectrum, onward = here.transform()
-        results.append(here.rate(spectrum, shape))
+        here, onward = mesh.transform()
+        results.append(mesh.rate(here, shape))
         if level < top:
-            passed, passed_axes = here.pass_on(onward)
-    return _add_up(plan, results, frames, shape)
+            passed = mesh.pass_on(onward)
+    return add_up(plan, results, shape)
 
 
 def _levels(
@@ -171,30 +178,20 @@ def _wings(plan: Plan, top: int, shape: tuple[int, int], total: float) -> float:
     """
     period = max(shape) + 2 * plan.reach(top)
     otf = plan.optics.transfer(np.array([0.0]), np.array([1 / period]))[0, 0]
-    return total * 4 * abs(1 - abs(otf)) / period**2
+    return float(total * 4 * abs(1 - abs(otf)) / period**2)
 
 
-class _Level:
+class _Mesh:
     """One mesh: what is painted on it, its transform and its contribution."""
 
     def __init__(
-        self,
-        plan: Plan,
-        level: int,
-        top: int,
-        frame: tuple[tuple[int, int], tuple[int, int]],
-        plain: Gaussians,
-        spread: Gaussians,
-        discs: SourceArrays,
-        disc_rate: Array,
-        passed: Array | None,
-        passed_axes: tuple[Interval, Interval] | None,
+        self, plan: Plan, level: int, last: bool, frame: tuple[Span, Span], content: _Content
     ) -> None:
-        self.plan, self.level, self.last = plan, level, level == top
+        self.plan, self.level, self.last = plan, level, last
         self.cell = plan.cell_size(level)
-        self.empty = (
-            passed is None and not len(plain) and not len(spread) and not len(discs)
-        )
+        plain, spread, discs = content.plain, content.spread, content.discs
+        passed = content.passed
+        self.empty = passed is None and not len(plain) and not len(spread) and not len(discs)
         if self.empty:
             return
         sigma, cut = plan.spread() * self.cell, plan.cut()
@@ -205,7 +202,7 @@ class _Level:
             reach = plan.reach(level)
             # the same for all scenes that lie in the frame, so that filters can be kept
             edge = cut * sigma + 2 * self.cell
-            content = [low - edge, high + edge]
+            extent = [low - edge, high + edge]
             for centre, half in (
                 (
                     (plain.y, plain.x)[axis],
@@ -218,14 +215,14 @@ class _Level:
                 ((discs.y, discs.x)[axis], disc_half[axis] * 1.1 + cut * sigma + 12 * self.cell),
             ):
                 if centre.size:
-                    content[0] = min(content[0], float((centre - half).min()))
-                    content[1] = max(content[1], float((centre + half).max()))
-            if passed_axes is not None:
-                content[0] = min(content[0], passed_axes[axis][0])
-                content[1] = max(content[1], passed_axes[axis][1])
+                    extent[0] = min(extent[0], float((centre - half).min()))
+                    extent[1] = max(extent[1], float((centre + half).max()))
+            if passed is not None:
+                extent[0] = min(extent[0], passed.intervals[axis][0])
+                extent[1] = max(extent[1], passed.intervals[axis][1])
             axes.append(
                 _axis(
-                    (content[0], content[1]),
+                    (extent[0], extent[1]),
                     frame[axis],
                     reach,
                     self.cell,
@@ -241,17 +238,19 @@ class _Level:
                 "the PSF's diffraction rings reach far; choose a larger tolerance, a smaller "
                 "frame or a PSF averaged over a band."
             )
-        self.plain_mesh = self.low_mesh = None
+        self.plain_mesh: Array | None = None
+        self.low_mesh: Array | None = None
         if len(plain):
             self.plain_mesh = np.zeros(self.shape)
             paint(self.plain_mesh, start, self.cell, plain, 0.0, cut)
         if len(spread) or len(discs) or passed is not None:
             self.low_mesh = np.zeros(self.shape)
             paint(self.low_mesh, start, self.cell, spread, sigma, cut)
-            paint_discs(self.low_mesh, start, self.cell, discs, disc_rate, sigma, cut)
-            if passed is not None and passed_axes is not None:
-                y, x = (round((passed_axes[a][0] - start[a]) / self.cell) for a in (0, 1))
-                self.low_mesh[y : y + passed.shape[0], x : x + passed.shape[1]] += passed
+            paint_discs(self.low_mesh, start, self.cell, discs, content.disc_rate, sigma, cut)
+            if passed is not None:
+                y, x = (round((passed.intervals[a][0] - start[a]) / self.cell) for a in (0, 1))
+                rows, columns = passed.values.shape
+                self.low_mesh[y : y + rows, x : x + columns] += passed.values
 
     def transform(self) -> tuple[Spectrum, Spectrum]:
         """Transform of the contribution, and that of the density to pass on."""
@@ -300,7 +299,7 @@ class _Level:
         wanted: Array = values[np.ix_(*index)]
         return wanted
 
-    def pass_on(self, onward: Spectrum) -> tuple[Array, tuple[Interval, Interval]]:
+    def pass_on(self, onward: Spectrum) -> Density:
         """Density for the next level, spread for it and sampled on its mesh."""
         ny, nx = self.shape
         density = fft.irfft2(fold(onward, ny, nx), (ny // 2, nx // 2), workers=-1)
@@ -312,12 +311,10 @@ class _Level:
             begin = round(axis.start / (2 * self.cell))
             index.append(np.arange(first - begin, last + 1 - begin) % (axis.count // 2))
             intervals.append((first * 2 * self.cell, last * 2 * self.cell))
-        return density[np.ix_(*index)], (intervals[0], intervals[1])
+        return Density(density[np.ix_(*index)], (intervals[0], intervals[1]))
 
 
-def _axis(
-    content: Interval, frame: tuple[int, int], reach: float, cell: float, room: float
-) -> Axis:
+def _axis(content: Interval, frame: Span, reach: float, cell: float, room: float) -> Axis:
     """Lay out an axis so that neither the kernel nor what is passed on wraps into the frame."""
     # on a point of the next mesh, and on a pixel
     step = max(2 * cell, 1.0)
@@ -371,80 +368,3 @@ def fold(spectrum: Spectrum, ny: int, nx: int) -> Spectrum:
     mirrored = np.roll(high[::-1], 1, axis=0).conj()
     result: Spectrum = 0.25 * (low + mirrored)
     return result
-
-
-def _coarser(frame: tuple[int, int], taps: int) -> tuple[int, int]:
-    """Mesh indices of the next level from which those of ``frame`` can be interpolated."""
-    return frame[0] // 2 - taps, -(-frame[1] // 2) + taps
-
-
-def _add_up(
-    plan: Plan,
-    results: list[Array | None],
-    frames: list[tuple[tuple[int, int], tuple[int, int]]],
-    shape: tuple[int, int],
-) -> Array:
-    """Interpolate the coarse levels down to the pixels and add all."""
-    image = np.zeros(shape)
-    carried: Array | None = None
-    at: tuple[tuple[int, int], tuple[int, int]] | None = None
-    for level in range(len(results) - 1, -1, -1):
-        cell, result = plan.cell_size(level), results[level]
-        if cell <= 1:
-            if carried is not None and at is not None:
-                image += _finer(plan, carried, at, ((0, shape[0] - 1), (0, shape[1] - 1)))
-                carried = None
-            if result is not None:
-                image += result
-            continue
-        if carried is not None and at is not None:
-            carried = _finer(plan, carried, at, frames[level])
-            carried = carried if result is None else carried + result
-        else:
-            carried = result
-        at = frames[level]
-    if carried is not None and at is not None:
-        cell = plan.cell_size(0)
-        while cell > 1:
-            cell /= 2
-            target = [(0, n - 1) for n in shape]
-            for _ in range(round(np.log2(cell))):
-                target = [_coarser(f, plan.taps()) for f in target]
-            carried = _finer(plan, carried, at, (target[0], target[1]))
-            at = (target[0], target[1])
-        image += carried
-    return image
-
-
-def _finer(
-    plan: Plan,
-    values: Array,
-    at: tuple[tuple[int, int], tuple[int, int]],
-    to: tuple[tuple[int, int], tuple[int, int]],
-) -> Array:
-    """Interpolate from one mesh to the next finer one."""
-    y = _interpolation(at[0], to[0], plan.taps(), plan.attenuation())
-    x = _interpolation(at[1], to[1], plan.taps(), plan.attenuation())
-    finer: Array = (x @ (y @ values).T).T
-    return finer
-
-
-@lru_cache(maxsize=64)
-def _interpolation(
-    at: tuple[int, int], to: tuple[int, int], taps: int, attenuation: float
-) -> sparse.csr_array:
-    """Matrix that interpolates halfway between mesh points by a Kaiser-windowed sinc."""
-    offset = np.arange(-taps, taps) + 0.5
-    beta = signal.kaiser_beta(attenuation)
-    weight = np.sinc(offset) * np.i0(beta * np.sqrt(1 - (offset / (taps + 0.5)) ** 2))
-    weight /= weight.sum()
-    fine = np.arange(to[0], to[1] + 1)
-    even = np.flatnonzero(fine % 2 == 0)
-    odd = np.flatnonzero(fine % 2 != 0)
-    column = (fine[odd] // 2)[:, None] + np.arange(1 - taps, taps + 1) - at[0]
-    rows = np.concatenate([even, np.repeat(odd, 2 * taps)])
-    columns = np.concatenate([fine[even] // 2 - at[0], column.ravel()])
-    entries = np.concatenate([np.ones(even.size), np.tile(weight, odd.size)])
-    return sparse.csr_array(
-        (entries, (rows, columns)), shape=(fine.size, at[1] - at[0] + 1), dtype=np.float64
-    )

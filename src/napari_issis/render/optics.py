@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ class Optics:
 
     def band_limit(self, threshold: float) -> float:
         """Frequency in cycles per pixel beyond which the OTF is below ``threshold``."""
-        return self.psf.band_limit(threshold) * self.pixel_scale
+        return _band_limit(self, threshold)
 
     def transfer(self, ky: Array, kx: Array, limit: float = np.inf) -> Transfer:
         """OTF times the pixel's transform on the grid (ky, kx).
@@ -63,3 +64,8 @@ class Optics:
             transfer *= np.sinc(ky)[:, None]
             transfer *= np.sinc(kx)[None, :]
         return transfer
+
+
+@lru_cache(maxsize=256)
+def _band_limit(optics: Optics, threshold: float) -> float:
+    return optics.psf.band_limit(threshold) * optics.pixel_scale

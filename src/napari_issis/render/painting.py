@@ -45,9 +45,7 @@ def paint(
     if same.any():
         _paint_points(mesh, y[same], x[same], gaussians.rate[same], spread, cell, cut)
     for i in np.flatnonzero(~same):
-        _paint_one(
-            mesh, y[i], x[i], gaussians.rate[i], yy[i], xy[i], xx[i], cell, cut
-        )
+        _paint_one(mesh, y[i], x[i], gaussians.rate[i], yy[i], xy[i], xx[i], cell, cut)
 
 
 def _paint_one(

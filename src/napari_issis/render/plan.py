@@ -69,7 +69,8 @@ class Plan:
         if level == 0 and not self.stamps:
             return np.ones_like(k)
         width = self._width(level)
-        return 0.5 * special.erfc((k - 1.4 * np.sqrt(self.digits) * width) / width)
+        passed: Array = 0.5 * special.erfc((k - 1.4 * np.sqrt(self.digits) * width) / width)
+        return passed
 
     def _width(self, level: int) -> float:
         """Width of the error function at the filter's edge.
@@ -141,8 +142,8 @@ def make_plan(
     sharp_edge : bool
         Whether the transfer function ends at a sharp edge, see `direct`.
     """
-    # a tenth of the error allowed, in quarter steps so that plans are shared
-    digits = float(np.ceil(4 * np.log(10 / max(accuracy, 1e-15))) / 4)
+    # a third of the error allowed, in quarter steps so that plans are shared
+    digits = float(np.ceil(4 * np.log(3 / max(accuracy, 1e-15))) / 4)
     ring_digits = float(np.ceil(2 * np.log(10 / max(ring_accuracy, FAINTEST_RINGS))) / 2)
     highest = max(optics.band_limit(0.1 * np.exp(-digits)), 1e-6)
     if sharp_edge:

@@ -38,7 +38,7 @@ class GaussianSum:
 
 
 def sersic_b(n: float) -> float:
-    """Return b of exp(-b r^(1/n)) with half of the light inside r = 1 (Ciotti 1991, A&A 249, 99)."""
+    """Return b of exp(-b r^(1/n)), half of the light inside r = 1 (Ciotti 1991, A&A 249, 99)."""
     return float(special.gammaincinv(2 * n, 0.5))
 
 
@@ -106,7 +106,7 @@ def _nearly_gaussian(n: float, digits: float) -> GaussianSum:
 
 
 def _stable_density_log(log_s: Array, beta: float) -> Array:
-    """s times the one-sided stable density of index beta, at s = exp(log_s).
+    """S times the one-sided stable density of index beta, at s = exp(log_s).
 
     Zolotarev's integral (Kanter 1975, Ann. Probab. 3, 697), by the tanh-sinh rule, which
     follows the integrand's peak towards either end.

@@ -93,11 +93,12 @@ def _grid(half: int, reach: int, limit: float) -> _Grid:
 def _point_spectrum(plan: Plan, half: int, reach: int, limit: float) -> Transfer:
     """High-passed transfer function on the quadrant (radial) or the full grid of a stamp."""
     grid = _grid(half, reach, limit)
+    spectrum: Transfer
     if plan.optics.radial:
-        return high_pass(plan, grid.k, grid.k) * grid.weight[:, None] * grid.weight
-    return high_pass(plan, _both_signs(grid.k), grid.k) * (grid.weight / grid.weight[0]) * (
-        grid.weight[0] ** 2
-    )
+        spectrum = high_pass(plan, grid.k, grid.k) * grid.weight[:, None] * grid.weight
+    else:
+        spectrum = high_pass(plan, _both_signs(grid.k), grid.k) * grid.weight * grid.weight[0]
+    return spectrum
 
 
 def _both_signs(k: Array) -> Array:
@@ -123,9 +124,7 @@ def _turned(grid: _Grid, shift: Array) -> tuple[Array, Array]:
     return cos_m * cos_s + sin_m * sin_s, sin_m * cos_s - cos_m * sin_s
 
 
-def _add_points(
-    image: Array, plan: Plan, y: Array, x: Array, rate: Array, reach: float
-) -> None:
+def _add_points(image: Array, plan: Plan, y: Array, x: Array, rate: Array, reach: float) -> None:
     half = int(np.ceil(reach))
     limit = _limit(plan)
     if not y.size or limit <= 0:
@@ -154,13 +153,11 @@ def _images(
     """
     turn = (0, 2, 1)
     if not np.iscomplexobj(even):
-        stamps: Array = cos_y @ even @ cos_x.transpose(turn)
+        stamps: Array = cos_y @ even.real @ cos_x.transpose(turn)
         if odd is not None:
             stamps -= sin_y @ odd @ sin_x.transpose(turn)
         return stamps
-    phase_y = np.concatenate(
-        [(cos_y - 1j * sin_y)[..., :0:-1], cos_y + 1j * sin_y], axis=-1
-    )
+    phase_y = np.concatenate([(cos_y - 1j * sin_y)[..., :0:-1], cos_y + 1j * sin_y], axis=-1)
     half_way = phase_y @ even
     result: Array = half_way.real @ cos_x.transpose(turn) - half_way.imag @ sin_x.transpose(turn)
     return result
@@ -174,7 +171,9 @@ def _add_extended(
         return
     half_y, half_x = _half_sizes(plan, one, rate, reach, allowed)
     row, column = round(float(one.y[0])), round(float(one.x[0]))
-    if not (-half_y <= row < image.shape[0] + half_y and -half_x <= column < image.shape[1] + half_x):
+    if not (
+        -half_y <= row < image.shape[0] + half_y and -half_x <= column < image.shape[1] + half_x
+    ):
         return
     grid_y, grid_x = _grid(half_y, half_y, limit), _grid(half_x, half_x, limit)
     cos_y, sin_y = _turned(grid_y, one.y - row)
@@ -186,7 +185,7 @@ def _add_extended(
         count = grid_y.k.size
         upper, lower = profile[count - 1 :], profile[count - 1 :: -1]
         even = 0.5 * (upper + lower) * filtered
-        odd = 0.5 * (upper - lower) * filtered
+        odd = (0.5 * (upper - lower) * filtered).real
         stamp = _images(even, odd, cos_y, sin_y, cos_x, sin_x)[0]
     else:
         spectrum = high_pass(plan, ky, kx) * profile * grid_x.weight * grid_y.weight[0]
@@ -240,8 +239,8 @@ def _needed_limit(plan: Plan, one: SourceArrays, rate: float, allowed: float) ->
 
 @lru_cache(maxsize=16)
 def _radial_high_pass(plan: Plan, limit: float, count: int) -> Array:
-    k = (np.arange(count) + 0.5) * (limit / count)
-    zero = np.zeros(1)
+    k = (np.arange(count, dtype=np.float64) + 0.5) * (limit / count)
+    zero: Array = np.zeros(1)
     transfer = np.maximum(
         np.abs(plan.optics.transfer(zero, k)[0]), np.abs(plan.optics.transfer(k, zero)[:, 0])
     )
@@ -268,7 +267,10 @@ def _half_sizes(
     pa = np.radians(one.pa[0])
     ratio = 1 - one.ellipticity[0]
     sizes = []
-    for direction in (np.hypot(np.cos(pa), ratio * np.sin(pa)), np.hypot(np.sin(pa), ratio * np.cos(pa))):
+    for direction in (
+        np.hypot(np.cos(pa), ratio * np.sin(pa)),
+        np.hypot(np.sin(pa), ratio * np.cos(pa)),
+    ):
         own = np.sqrt(2 * plan.digits) * widest * direction
         sizes.append(int(np.ceil(np.hypot(reach, own))))
     return sizes[0], sizes[1]
@@ -280,4 +282,6 @@ def _place(image: Array, stamp: Array, row: int, column: int) -> None:
     bottom = min(row + stamp.shape[0], image.shape[0])
     right = min(column + stamp.shape[1], image.shape[1])
     if top < bottom and left < right:
-        image[top:bottom, left:right] += stamp[top - row : bottom - row, left - column : right - column]
+        image[top:bottom, left:right] += stamp[
+            top - row : bottom - row, left - column : right - column
+        ]
