@@ -44,7 +44,7 @@ class PSF(Protocol):
         """Half-size in arcsec beyond which the PSF is zero."""
 
     def band_limit(self, threshold: float) -> float:
-        """Frequency in cycles per arcsec beyond which the OTF's modulus is at most ``threshold``."""
+        """Frequency in cycles per arcsec above which |OTF| is at most ``threshold``."""
 
     def otf_grid(self, fy: Array, fx: Array) -> NDArray[np.complexfloating] | Array:
         """OTF on the grid of frequencies (fy, fx), shape (len(fy), len(fx))."""
@@ -84,7 +84,7 @@ class RadialPSF:
         return np.inf
 
     def band_limit(self, threshold: float) -> float:
-        """Frequency in cycles per arcsec beyond which the OTF's modulus is at most ``threshold``."""
+        """Frequency in cycles per arcsec above which |OTF| is at most ``threshold``."""
         if threshold >= 1:
             return 0.0
         low, high = 0.0, 1.0
@@ -338,7 +338,7 @@ class ImagePSF:
         return float(0.5 * max(self.array.shape) * self.pixel_scale)
 
     def band_limit(self, threshold: float) -> float:
-        """Frequency in cycles per arcsec beyond which the OTF's modulus is at most ``threshold``."""
+        """Frequency in cycles per arcsec above which |OTF| is at most ``threshold``."""
         nyquist = 0.5 / self.pixel_scale
         f = np.linspace(-nyquist, nyquist, 4 * max(self.array.shape) + 1)
         above = np.abs(self.otf_grid(f, f)) > threshold
