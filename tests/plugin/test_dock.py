@@ -114,6 +114,7 @@ def test_the_instrument_form_sets_the_observation(scene, instrument):
     assert instrument.seed.value == 4
     # 4.9e-3 and 7.2e-12 cps per pixel behind NF1.
     assert "0.00049 cps/px" in instrument.sky.text()
+    assert "geocorona 0.00049" in instrument.sky.text()
     assert "7.2e-13" in instrument.sky.text()
 
 

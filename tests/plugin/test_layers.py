@@ -82,7 +82,7 @@ def test_the_ellipse_holds_half_of_the_light():
 
 
 @given(galaxies)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_round_trip_changes_nothing(table):
     """Catches rows that drift because napari rounds to float32."""
     written = as_napari_keeps(shapes_data(table))
@@ -90,7 +90,7 @@ def test_round_trip_changes_nothing(table):
 
 
 @given(galaxies, st.integers(0, 3), st.booleans())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_any_corner_first_and_mirrored_boxes_are_the_same_ellipse(table, first, mirrored):
     """Catches a conversion that trusts the order of the corners."""
     corners = shapes_data(table)

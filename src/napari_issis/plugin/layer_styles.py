@@ -35,7 +35,7 @@ ELLIPSES: dict[str, Any] = {
     "name": "ISSIS extended sources",
     "face_color": "transparent",
     "edge_color": ELLIPSE_COLORS["exponential"],
-    "edge_width": 0.8,
+    "edge_width": 0.6,
     **GEOMETRY,
 }
 FRAME_COLOR = "#7a7f88"

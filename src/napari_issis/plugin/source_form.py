@@ -13,7 +13,7 @@ from magicgui.widgets import (
     SpinBox,
 )
 from napari.utils.notifications import show_error
-from qtpy.QtWidgets import QWidget
+from qtpy.QtWidgets import QAbstractSpinBox, QWidget
 
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -82,6 +82,9 @@ class SourceForm(Form):
         )
         self.x = _real(256.0, -1e6, 1e6, "x, column of the centre, pixels (first pixel: 0)")
         self.y = _real(256.0, -1e6, 1e6, "y, row of the centre, pixels (first pixel: 0)")
+        for box in (self.x, self.y):
+            # Room for the digits; the arrow keys step as well.
+            box.native.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
         self.flux = LineEdit(value=f"{DEFAULT_FLUX:g}", tooltip=FLUX_HELP)
         self.r_half = _real(DEFAULT_R_HALF, 0.01, 1e5, R_HELP)
         self.ellipticity = _real(DEFAULT_ELLIPTICITY, 0.0, 0.99, E_HELP, 0.05)
