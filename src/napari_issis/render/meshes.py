@@ -277,7 +277,7 @@ class _Mesh:
         return spectrum, spectrum if onward is None else onward
 
     def _filter(self, *, spread: bool) -> Transfer:
-        return _filter(self.plan, self.level, self.last, self.shape, spread)
+        return _filter(self.plan.without_rings(), self.level, self.last, self.shape, spread)
 
     def _widening(self, to: float, already: float) -> tuple[Array, Array]:
         """Transform of the Gaussian that widens from ``already`` to ``to`` cells' spreading."""

@@ -14,7 +14,7 @@ summation (Skeel, Tezcan & Hardy 2002, J. Comput. Chem. 23, 673) with exact conv
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -59,6 +59,10 @@ class Plan:
     ring_digits: float
     cell: float
     stamps: bool
+
+    def without_rings(self) -> Plan:
+        """Return the plan as far as filters depend on it: on the rings only reaches do."""
+        return replace(self, ring_digits=0.0)
 
     def cell_size(self, level: int) -> float:
         """Cell of a mesh in pixels."""
@@ -184,20 +188,34 @@ def _reach(plan: Plan, level: int) -> float:
         return window + plan.optics.extent
     if plan.ring_digits <= 0 or psf.first_edge() == np.inf or level > 3:
         return window
-    return max(window, _ring_reach(plan, psf, level, window))
+    return max(window, _ring_reach(plan, level, window))
 
 
-def _ring_reach(plan: Plan, psf: RadialPSF, level: int, start: float) -> float:
+def _ring_reach(plan: Plan, level: int, start: float) -> float:
     """Distance at which a kernel's rings are below the accuracy.
 
     The edges of the aperture and of its obscuration make rings that fall like r^-3 only. They
-    are measured on the kernel, the Hankel transform of its filter, out to six times the
-    filter's own reach, and beyond that by their law.
+    are measured out to six times the filter's own reach, and beyond that follow their law.
     """
-    limit = plan.optics.band_limit(0.1 * np.exp(-plan.ring_digits))
-    if limit <= 0:
-        return start
-    r = start * np.geomspace(1.0, 6.0, 400)
+    r, envelope = _rings(plan.without_rings(), level, start)
+    allowed = 0.3 * np.exp(-plan.ring_digits)
+    below = np.flatnonzero(envelope <= allowed)
+    if below.size:
+        return float(r[below[0]])
+    return float(r[-1] * (envelope[-16] / allowed) ** (1 / 3))
+
+
+@lru_cache(maxsize=64)
+def _rings(plan: Plan, level: int, start: float) -> tuple[Array, Array]:
+    """Radii in pixels and the largest amplitude of a level's kernel beyond each.
+
+    The amplitude is over a point source's peak; the kernel is the Hankel transform of its
+    filter.
+    """
+    psf = plan.optics.psf
+    assert isinstance(psf, RadialPSF)
+    limit = plan.optics.band_limit(0.1 * np.exp(-plan.digits))
+    r = start * np.geomspace(1.0, 6.0, 160)
     # Gauss-Legendre on panels of less than two oscillations each
     x, w = np.polynomial.legendre.leggauss(16)
     panels = int(limit * r[-1]) + 8
@@ -209,9 +227,4 @@ def _ring_reach(plan: Plan, psf: RadialPSF, level: int, start: float) -> float:
     passed = np.ones_like(k) if level < 0 else plan.lowpass(k, level)
     band = measure * (passed - plan.lowpass(k, level + 1))
     kernel = np.abs(special.j0(2 * np.pi * np.outer(r, k)) @ band) / abs(measure.sum())
-    envelope = np.maximum.accumulate(kernel[::-1])[::-1]
-    allowed = 0.3 * np.exp(-plan.ring_digits)
-    below = np.flatnonzero(envelope <= allowed)
-    if below.size:
-        return float(r[below[0]])
-    return float(r[-1] * (envelope[-40] / allowed) ** (1 / 3))
+    return r, np.maximum.accumulate(kernel[::-1])[::-1]

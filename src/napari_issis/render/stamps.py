@@ -43,6 +43,7 @@ def add_stamps(
         out, and so are frequencies that add up to less.
     """
     reach = plan.reach(-1)
+    plan = plan.without_rings()
     is_point = sources.kind == "point"
     near = _within(sources, np.full(len(sources), reach), image.shape) & (rate != 0)
     points = is_point & near
