@@ -76,6 +76,20 @@ def test_random_scenes_keep_the_tolerance(seed):
     assert np.abs(got - expected).max() <= tolerance * image.max()
 
 
+@pytest.mark.parametrize("ellipticity", [0.86, 0.92])
+@pytest.mark.parametrize("kind", ["gaussian", "devaucouleurs", "uniform"])
+def test_needles(kind, ellipticity):
+    """Very elongated sources, which the meshes cut into links (catches links too far apart)."""
+    observation = ni.Observation(shape=(26, 26), psf=ni.GaussianPSF(1.5 * PIXEL))
+    table = ni.source(kind, 12.3, 13.1, 1e-14, 7.0, ellipticity, 30.0)
+    image = ni.count_rate(table, observation, tolerance=1e-7)
+    pixels = [(13, 12), (19, 9), (6, 16), (12, 14), (22, 3)]
+    one = (kind, 12.3, 13.1, 7.0, ellipticity, 30.0, INDEX.get(kind, 1.0))
+    expected = 1e-14 * CPS * quadrature_rate(one, pixels, 1.5 * SIGMA_PER_FWHM)
+    got = np.array([image[p] for p in pixels])
+    assert np.abs(got - expected).max() <= 1e-7 * image.max()
+
+
 @pytest.mark.parametrize("obscuration", [0.0, 0.35])
 def test_bare_diffraction_star(obscuration):
     """Star through a bare annulus: pixel integrals of the closed-form Airy pattern.
