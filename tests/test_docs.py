@@ -24,7 +24,7 @@ def test_there_are_blocks():
     assert len(list(blocks())) >= 3
 
 
-@pytest.mark.parametrize("code", blocks())
+@pytest.mark.parametrize("code", list(blocks()))
 def test_block_runs(code, tmp_path, monkeypatch, request):
     monkeypatch.chdir(tmp_path)
     if "show(" in code:

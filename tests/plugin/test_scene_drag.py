@@ -201,7 +201,7 @@ def test_what_is_no_edit_asks_for_no_picture(scene, monkeypatch, qtbot):
     points.selected_data = {0}
     points.current_size = 20
     points.size = 15
-    scene.viewer.camera.zoom = 30
+    scene.viewer.scene.camera.zoom = 30
     scene.editor.ellipses.layer.selected_data = {1}
     scene.editor.ellipses.layer.edge_width = 2
     qtbot.wait(30)

@@ -233,10 +233,10 @@ def test_all_layers_deleted_and_back(scene):
     viewer = scene.viewer
     viewer.layers.clear()
     assert len(scene.sources) == 0
-    assert viewer.camera.orientation2d == ("down", "right")
+    assert viewer.scene.camera.orientation2d == ("down", "right")
     scene.sources = few_sources()
     assert_consistent(scene)
-    assert viewer.camera.orientation2d == ("up", "right")
+    assert viewer.scene.camera.orientation2d == ("up", "right")
 
 
 def test_renamed_and_reordered_layers_are_still_ours(scene, mouse):

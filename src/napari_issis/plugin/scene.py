@@ -59,7 +59,7 @@ class Scene:
         self.counts = CountsLayer()
         self._observation = Observation()
         self._seed = 0
-        self._orientation = viewer.camera.orientation2d
+        self._orientation = viewer.scene.camera.orientation2d
 
         self._maker = PictureMaker()
         self._jobs = LatestWins(self._show, self._failed)
@@ -258,15 +258,15 @@ class Scene:
             self.viewer.reset_view()
 
     def _orient(self) -> None:
-        self._orientation = self.viewer.camera.orientation2d
-        self.viewer.camera.orientation2d = ORIENTATION
+        self._orientation = self.viewer.scene.camera.orientation2d
+        self.viewer.scene.camera.orientation2d = ORIENTATION
 
     def _layer_removed(self, event: Any) -> None:
         if event.value is self.counts.layer:
             self.counts.layer = None
         self.editor.layer_removed(event.value)
-        if not self.layers and self.viewer.camera.orientation2d == ORIENTATION:
-            self.viewer.camera.orientation2d = self._orientation
+        if not self.layers and self.viewer.scene.camera.orientation2d == ORIENTATION:
+            self.viewer.scene.camera.orientation2d = self._orientation
 
     def _pick(self, _viewer: Any, event: Any) -> None:
         activate_source_under(self.viewer.layers, self.layers, event)
