@@ -7,6 +7,7 @@ from scipy import integrate, special
 
 import napari_issis as ni
 from napari_issis.render import render
+from quadrature import disc_rate
 from quadrature import rate as quadrature_rate
 
 CPS = 1.14e17  # NUV, the paper's
@@ -88,6 +89,27 @@ def test_needles(kind, ellipticity):
     expected = 1e-14 * CPS * quadrature_rate(one, pixels, 1.5 * SIGMA_PER_FWHM)
     got = np.array([image[p] for p in pixels])
     assert np.abs(got - expected).max() <= 1e-7 * image.max()
+
+
+@pytest.mark.parametrize(
+    "disc",
+    [
+        (10, 20, 20, 0.4, 30),
+        (-350, 20, 290, 0.2, 30),
+        (-360, 20, 310, 0.2, 30),
+        (20, 30, 3000, 0.98, 70),
+        (-1.2e5, 3e4, 1e5, 0.5, 80),
+    ],
+)
+def test_uniform_ellipses_of_any_size(disc):
+    """Larger than frame and meshes too (catches a lost edge, and light lost outside a mesh)."""
+    observation = ni.Observation(shape=(60, 60), psf=ni.GaussianPSF(0.06))
+    image = ni.count_rate(ni.source("uniform", *disc[:2], 1e-14, *disc[2:]), observation)
+    brightest = tuple(int(i) for i in np.unravel_index(image.argmax(), image.shape))
+    pixels = [(0, 0), (30, 30), (59, 59), (0, 59), (59, 0), (20, 10), brightest]
+    expected = 1e-14 * CPS * disc_rate(disc, pixels, 0.06 / PIXEL * SIGMA_PER_FWHM)
+    got = np.array([image[p] for p in pixels])
+    assert np.abs(got - expected).max() <= 1e-6 * image.max()
 
 
 @pytest.mark.parametrize("obscuration", [0.0, 0.35])

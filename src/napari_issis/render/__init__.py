@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 # tolerances accepted; below, rounding of the transforms is larger
 SMALLEST_TOLERANCE = 1e-12
+# half-light radius in pixels above which a uniform ellipse gets no stamp of its own
+LARGEST_STAMP = 300.0
 
 
 def count_rate(
@@ -108,7 +110,7 @@ def _render(
     brightest: float,
 ) -> Array:
     """Render with an error of at most ``allowed`` cps per pixel."""
-    is_point = sources.kind == "point"
+    is_point, is_disc = sources.kind == "point", sources.kind == "uniform"
     sharp_edge = has_sharp_edge(
         optics, 0.1 * allowed / brightest, optics.extent + 50.0, point_area(optics)
     )
@@ -120,9 +122,9 @@ def _render(
         int(is_point.sum()),
         int((~is_point).sum()),
         sharp_edge,
+        meshes_only=bool(np.any(sources.r_half[is_disc] > LARGEST_STAMP)),
     )
     share = 0.03 * allowed
-    is_disc = sources.kind == "uniform"
     limit = min(BAND / plan.cell_size(0), optics.band_limit(0.01 * np.exp(-plan.digits)))
     gaussians = decompose(
         sources.take(~is_disc),

@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..sources import SourceArrays
-from .discs import disc_half_sizes, paint_discs
+from .discs import disc_half_sizes, paint_discs, paint_large_discs
 from .gaussians import Gaussians
 from .interpolation import Span, add_up, spans
 from .optics import Transfer
 from .painting import paint
 from .plan import Plan
 
+# Uniform ellipses wider than this, in cells of the finest mesh, are painted on every mesh as far
+# as they lie on it, instead of once and whole.
+LARGEST_DISC = 1500
 # points of a mesh, some 4 GB of memory in all
 LARGEST_MESH = 1.3e8
 
@@ -56,6 +59,8 @@ class _Content:
     spread: Gaussians
     discs: SourceArrays
     disc_rate: Array
+    large: SourceArrays
+    large_rate: Array
     passed: Density | None
 
 
@@ -90,11 +95,14 @@ def mesh_rate(
     """
     if not len(gaussians) and not len(discs):
         return np.zeros(shape)
+    is_large = discs.r_half > LARGEST_DISC * plan.cell_size(0)
+    large, large_rate = discs.take(is_large), disc_rate[is_large]
+    discs, disc_rate = discs.take(~is_large), disc_rate[~is_large]
     level_of, plain = _levels(plan, shape, gaussians)
     disc_level = _first_in_reach(
         plan, shape, discs.y, discs.x, disc_half_sizes(discs), np.zeros(len(discs), dtype=np.intp)
     )
-    total = float(np.abs(gaussians.rate).sum() + np.abs(disc_rate).sum())
+    total = float(sum(np.abs(r).sum() for r in (gaussians.rate, disc_rate, large_rate)))
     top = max(int(level_of.max(initial=0)), int(disc_level.max(initial=0)))
     while _wings(plan, top, shape, total) > allowed:
         top += 1
@@ -112,6 +120,8 @@ def mesh_rate(
                 spread=gaussians.take(mine & ~plain),
                 discs=discs.take(my_discs),
                 disc_rate=disc_rate[my_discs],
+                large=large,
+                large_rate=large_rate,
                 passed=passed,
             ),
         )
@@ -120,8 +130,7 @@ def mesh_rate(
             continue
         here, onward = mesh.transform()
         results.append(mesh.rate(here, shape))
-        if level < top:
-            passed = mesh.pass_on(onward)
+        passed = None if onward is None else mesh.pass_on(onward)
     return add_up(plan, results, shape)
 
 
@@ -191,7 +200,9 @@ class _Mesh:
         self.cell = plan.cell_size(level)
         plain, spread, discs = content.plain, content.spread, content.discs
         passed = content.passed
-        self.empty = passed is None and not len(plain) and not len(spread) and not len(discs)
+        large = content.large
+        count = len(plain) + len(spread) + len(discs) + len(large)
+        self.empty = passed is None and count == 0
         if self.empty:
             return
         sigma, cut = plan.spread() * self.cell, plan.cut()
@@ -201,7 +212,7 @@ class _Mesh:
             low, high = frame[axis][0] * self.cell, frame[axis][1] * self.cell
             reach = plan.reach(level)
             # the same for all scenes that lie in the frame, so that filters can be kept
-            edge = cut * sigma + 2 * self.cell
+            edge = cut * sigma + 2 * self.cell + (reach if len(large) else 0.0)
             extent = [low - edge, high + edge]
             for centre, half in (
                 (
@@ -240,6 +251,12 @@ class _Mesh:
             )
         self.plain_mesh: Array | None = None
         self.low_mesh: Array | None = None
+        self.large_mesh: Array | None = None
+        if len(large):
+            self.large_mesh = np.zeros(self.shape)
+            paint_large_discs(
+                self.large_mesh, start, self.cell, large, content.large_rate, sigma, plan.digits
+            )
         if len(plain):
             self.plain_mesh = np.zeros(self.shape)
             paint(self.plain_mesh, start, self.cell, plain, 0.0, cut)
@@ -252,8 +269,8 @@ class _Mesh:
                 rows, columns = passed.values.shape
                 self.low_mesh[y : y + rows, x : x + columns] += passed.values
 
-    def transform(self) -> tuple[Spectrum, Spectrum]:
-        """Transform of the contribution, and that of the density to pass on."""
+    def transform(self) -> tuple[Spectrum, Spectrum | None]:
+        """Transform of the contribution, and that of the density to pass on, if there is any."""
         spectrum: Spectrum | None = None
         onward: Spectrum | None = None
         next_y, next_x = self._widening(2.0, 0.0)
@@ -273,8 +290,11 @@ class _Mesh:
                 transformed *= next_y[:, None]
                 transformed *= next_x
                 onward = transformed if onward is None else onward + transformed
+        if self.large_mesh is not None:
+            filtered = fft.rfft2(self.large_mesh, workers=-1) * self._filter(spread=True)
+            spectrum = filtered if spectrum is None else spectrum + filtered
         assert spectrum is not None
-        return spectrum, spectrum if onward is None else onward
+        return spectrum, onward
 
     def _filter(self, *, spread: bool) -> Transfer:
         return _filter(self.plan.without_rings(), self.level, self.last, self.shape, spread)

@@ -128,6 +128,7 @@ def make_plan(
     points: int,
     extended: int,
     sharp_edge: bool = False,
+    meshes_only: bool = False,
 ) -> Plan:
     """Choose the meshes for a frame and a number of sources, by estimated run time.
 
@@ -145,6 +146,8 @@ def make_plan(
         Numbers of sources.
     sharp_edge : bool
         Whether the transfer function ends at a sharp edge, see `direct`.
+    meshes_only : bool
+        Whether a source is too large for a stamp.
     """
     # a third of the error allowed, in quarter steps so that plans are shared
     digits = float(np.ceil(4 * np.log(3 / max(accuracy, 1e-15))) / 4)
@@ -156,7 +159,7 @@ def make_plan(
         return Plan(optics, digits, 0.0, max(cell, 0.5), stamps=True)
     finest = 2.0 ** np.floor(np.log2(BAND / highest))
     meshes = Plan(optics, digits, max(ring_digits, 0.0), finest, stamps=False)
-    if finest >= 0.5:
+    if finest >= 0.5 or meshes_only:
         return meshes
     stamps = Plan(optics, digits, max(ring_digits, 0.0), 0.5, stamps=True)
     if _seconds(meshes, shape, points, extended) < _seconds(stamps, shape, points, extended):
