@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .exposure import Exposure, simulate
+from .image_psf import ImagePSF
 from .limits import CountRateWarning
 from .observation import Observation
-from .psf import GaussianPSF, ImagePSF, MoffatPSF, TelescopePSF
+from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sources import random_sources, source
 

@@ -55,7 +55,7 @@ def poisson_counts(
             f"expected has {expected.ndim} dimensions; give an image of shape (ny, nx)."
         )
     _check_range(expected)
-    u, z = _uniforms_and_normals(_checked_seed(seed), expected.shape)
+    u, z = _uniforms_and_normals(checked_seed(seed), expected.shape)
     if previous is None:
         return poisson_quantile(u.ravel(), expected.ravel(), z.ravel()).reshape(expected.shape)
     before, counts_before = (np.asarray(a) for a in previous)
@@ -97,7 +97,7 @@ def pixel_uniforms(seed: int, shape: tuple[int, int]) -> NDArray[np.float64]:
     of the seed; each row has 2^64 counter values of its own.
     """
     ny, nx = shape
-    return _uniforms_and_normals(_checked_seed(seed), (int(ny), int(nx)))[0]
+    return _uniforms_and_normals(checked_seed(seed), (int(ny), int(nx)))[0]
 
 
 @lru_cache(maxsize=2)
@@ -117,7 +117,8 @@ def _uniforms_and_normals(
     return u, z
 
 
-def _checked_seed(seed: Any) -> int:
+def checked_seed(seed: Any) -> int:
+    """Return a seed as an int, or raise a ValueError that names it."""
     if not isinstance(seed, Integral) or seed < 0:
         raise ValueError(f"seed is {seed!r}; it must be an integer of 0 or more.")
     return int(seed)

@@ -11,7 +11,7 @@ import numpy as np
 from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
-from .counts import poisson_counts
+from .counts import checked_seed, poisson_counts
 from .limits import CountRateWarning, count_rate_warnings
 from .observation import Observation
 from .render import render
@@ -120,6 +120,7 @@ def simulate(
         If the scene breaks a count-rate limit of a photon-counting detector.
     """
     observation = Observation() if observation is None else observation
+    seed = checked_seed(seed)
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
     for message in count_rate_warnings(rate, observation.sky_rate):
         warnings.warn(message, CountRateWarning, stacklevel=2)

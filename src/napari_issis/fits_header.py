@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from astropy.io import fits
 
+from .image_psf import ImagePSF
 from .instrument import PSF_NOTE
 from .observation import Observation
-from .psf import PSF, GaussianPSF, ImagePSF, MoffatPSF, TelescopePSF
+from .psf import PSF, GaussianPSF, MoffatPSF, TelescopePSF
 
 if TYPE_CHECKING:
     from .exposure import Exposure

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from .exposure import Exposure
 from .fits_header import observation_header, wcs_header
 from .fits_table import open_fits, read_table, table_hdu
+from .image_psf import ImagePSF
 from .observation import Observation
-from .psf import PSF, GaussianPSF, ImagePSF, MoffatPSF, TelescopePSF
+from .psf import PSF, GaussianPSF, MoffatPSF, TelescopePSF
 from .safe_write import replacing
 from .sources import check_sources
 

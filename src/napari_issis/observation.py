@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
+import astropy.units as u
 from astropy.coordinates import SkyCoord
 
 from .instrument import CHANNELS, FILTERS, PIXEL_SCALE, Channel
@@ -59,16 +60,16 @@ class Observation:
         set_ = object.__setattr__
         if self.instrument not in INSTRUMENTS:
             raise ValueError(f"instrument is {self.instrument!r}; known: {', '.join(INSTRUMENTS)}.")
-        if self.channel not in CHANNELS:
+        if self.channel not in tuple(CHANNELS):
             raise ValueError(f"channel is {self.channel!r}; known: {', '.join(CHANNELS)}.")
-        if isinstance(self.filters, str) or len(tuple(self.filters)) != 2:
+        if not isinstance(self.filters, tuple | list) or len(self.filters) != 2:
             raise ValueError(
                 f"filters is {self.filters!r}; give one filter for each of the two wheels, "
                 'such as ("open", "NF1").'
             )
         set_(self, "filters", tuple(self.filters))
         for name in self.filters:
-            if name not in FILTERS:
+            if name not in tuple(FILTERS):
                 raise ValueError(f"filter is {name!r}; known: {', '.join(FILTERS)}.")
         set_(self, "exposure", _number("exposure", self.exposure, "seconds", positive=True))
         set_(self, "shape", _shape(self.shape))
@@ -78,7 +79,10 @@ class Observation:
                 "background",
                 _number("background", self.background, "cps per pixel", positive=False),
             )
-        roll = float(self.roll)
+        try:
+            roll = float(u.Quantity(self.roll, u.deg).value)
+        except (TypeError, ValueError):
+            raise ValueError(f"roll is {self.roll!r}; it must be an angle in degrees.") from None
         if not isfinite(roll):
             raise ValueError(f"roll is {roll}; it must be a finite angle in degrees.")
         set_(self, "roll", roll)
@@ -89,6 +93,8 @@ class Observation:
         if self.pointing is not None:
             if not isinstance(self.pointing, SkyCoord) or not self.pointing.isscalar:
                 raise ValueError(f"pointing is {self.pointing!r}; give one SkyCoord.")
+            if not (isfinite(self.pointing.icrs.ra.deg) and isfinite(self.pointing.icrs.dec.deg)):
+                raise ValueError(f"pointing is {self.pointing!r}; it must be finite.")
             set_(self, "pointing", self.pointing.icrs)
 
     def replace(self, **changes: Any) -> Observation:

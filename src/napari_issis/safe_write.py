@@ -32,16 +32,22 @@ def check_target(
     FileExistsError
         If the file exists and may not be replaced.
     OSError
-        If the path is a directory or its folder does not exist.
+        If the path is not that of a regular file, or its folder is missing or not writable.
     """
     if not str(path).lower().endswith(endings):
         raise ValueError(f"cannot write {path}: the name must end in {' or '.join(endings)}.")
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise IsADirectoryError(f"cannot write {path}: it is a directory; give a file name.")
+    if target.exists() and not target.is_file():
+        raise OSError(f"cannot write {path}: it is not a regular file; give another name.")
     if not target.parent.is_dir():
         raise FileNotFoundError(
             f"cannot write {path}: the folder {target.parent} does not exist; create it first."
+        )
+    if not os.access(target.parent, os.W_OK):
+        raise PermissionError(
+            f"cannot write {path}: the folder {target.parent} is not writable; choose another."
         )
     if target.exists() and not overwrite:
         raise FileExistsError(

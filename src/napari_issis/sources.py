@@ -25,6 +25,10 @@ DEFAULT_PA = 45.0
 # Sersic (1963) index of the kinds that are one.
 SERSIC_INDEX = {"gaussian": 0.5, "exponential": 1.0, "devaucouleurs": 4.0}
 INDEX_RANGE = (0.5, 8.0)
+# Beyond these, numbers are slips of the pen: a frame has 10^3 pixels, the Sun's flux is about 1.
+FARTHEST = 1e9
+LARGEST_R_HALF = 1e7
+BRIGHTEST = 1.0
 
 
 @dataclass(frozen=True)
@@ -101,20 +105,17 @@ def source(
         raise ValueError(f"n is {n}, but only sources of kind 'sersic' have an index.")
     columns: dict[str, Any] = {
         "kind": [str(kind)],
-        "x": [x],
-        "y": [y],
+        "x": np.atleast_1d(_plain(x, u.pix)),
+        "y": np.atleast_1d(_plain(y, u.pix)),
         "flux": np.atleast_1d(_with_unit(flux, FLUX_UNIT)),
         "r_half": np.atleast_1d(_with_unit(r_half, u.pix)),
-        "ellipticity": [ellipticity],
+        "ellipticity": np.atleast_1d(_plain(ellipticity, u.dimensionless_unscaled)),
         "pa": np.atleast_1d(_with_unit(pa, u.deg)),
     }
     if n is not None:
-        columns["n"] = [n]
+        columns["n"] = np.atleast_1d(_plain(n, u.dimensionless_unscaled))
     table = QTable(columns)
     check_sources(table)
-    for name in ("x", "y", "ellipticity", "n"):
-        if name in table.colnames:
-            table[name] = np.asarray(table[name], dtype=float)
     return table
 
 
@@ -241,10 +242,15 @@ def check_sources(
     everything = np.ones(kind.size, dtype=bool)
     x = _column(table, "x", u.pix, everything)
     y = _column(table, "y", u.pix, everything)
+    for name, position in (("x", x), ("y", y)):
+        near = np.abs(position) <= FARTHEST
+        _require(name, position, near, everything, f"within {FARTHEST:g} pixels")
     flux = _column(table, "flux", FLUX_UNIT, everything, pivot=pivot or 2500.0)
-    _require("flux", flux, flux >= 0, everything, "zero or more erg s-1 cm-2 A-1")
+    good = (flux >= 0) & (flux <= BRIGHTEST)
+    _require("flux", flux, good, everything, f"in [0, {BRIGHTEST:g}] erg s-1 cm-2 A-1")
     r_half = _column(table, "r_half", u.pix, extended, pixel_scale=pixel_scale)
-    _require("r_half", r_half, r_half > 0, extended, "above 0 pixels")
+    good = (r_half > 0) & (r_half <= LARGEST_R_HALF)
+    _require("r_half", r_half, good, extended, f"above 0 and at most {LARGEST_R_HALF:g} pixels")
     ellipticity = _column(table, "ellipticity", u.dimensionless_unscaled, extended)
     _require(
         "ellipticity", ellipticity, (ellipticity >= 0) & (ellipticity < 1), extended, "in [0, 1)"
@@ -270,6 +276,11 @@ def check_sources(
 def empty_sources() -> QTable:
     """Make a source table with no rows."""
     return random_sources("point", 0)
+
+
+def _plain(value: Any, unit: u.UnitBase) -> Any:
+    """Return a value as a plain number in ``unit``."""
+    return u.Quantity(value, unit).value if hasattr(value, "unit") else float(value)
 
 
 def _with_unit(value: Any, unit: u.UnitBase) -> Any:

@@ -69,9 +69,9 @@ def render(
 
     The tolerance is tightened for that as far as ``floor``.
     """
-    if not SMALLEST_TOLERANCE <= tolerance <= 0.1:
+    if not isinstance(tolerance, float | int) or not SMALLEST_TOLERANCE <= tolerance <= 0.1:
         raise ValueError(
-            f"tolerance is {tolerance}; it must lie between {SMALLEST_TOLERANCE} and 0.1."
+            f"tolerance is {tolerance!r}; it must lie between {SMALLEST_TOLERANCE} and 0.1."
         )
     arrays = check_sources(
         sources, pivot=observation.channel_data.pivot, pixel_scale=observation.pixel_scale

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..psf import ImagePSF
+from ..image_psf import ImagePSF
 from ..sources import SourceArrays
 from .optics import Optics
 from .plan import Plan

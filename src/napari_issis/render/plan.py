@@ -189,7 +189,9 @@ def _reach(plan: Plan, level: int) -> float:
     psf = plan.optics.psf
     if not isinstance(psf, RadialPSF):
         return window + plan.optics.extent
-    if plan.ring_digits <= 0 or psf.first_edge() == np.inf or level > 3:
+    edge = psf.first_edge() * plan.optics.pixel_scale
+    highest = BAND / plan.cell_size(level) if level >= 0 else np.inf
+    if plan.ring_digits <= 0 or edge > highest:
         return window
     return max(window, _ring_reach(plan, level, window))
 

@@ -87,7 +87,8 @@ def sersic_gaussians(n: float, digits: float) -> GaussianSum:
     total = 2 * np.pi * n * b ** (-2 * n) * special.gamma(2 * n)
     fraction = amplitude * np.pi * np.exp(-log_t) / total
     sigma = np.sqrt(0.5) * np.exp(-0.5 * log_t)
-    kept = fraction > 1e-3 * np.exp(-digits)
+    # far wings are dropped by their light; in the cusp much less light makes a high peak
+    kept = fraction > np.where(sigma > 1, 1e-3, 1e-14) * np.exp(-digits)
     return GaussianSum(sigma[kept], fraction[kept] / fraction[kept].sum())
 
 
