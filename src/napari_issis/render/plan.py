@@ -226,10 +226,12 @@ def _rings(plan: Plan, level: int, start: float) -> tuple[Array, Array]:
     panels = int(limit * r[-1]) + 8
     k = ((np.arange(panels)[:, None] + 0.5 * (x + 1)) * (limit / panels)).ravel()
     weight = np.tile(w, panels)
-    # the pixel as a Gaussian of the same variance: the mean over angle is what matters here
-    pixel = np.exp(-(np.pi**2) * k**2 / 6)
-    measure = weight * k * pixel * psf.otf(k / plan.optics.pixel_scale)
+    measure = weight * k * psf.otf(k / plan.optics.pixel_scale)
+    # for the peak, the pixel as a Gaussian of the same variance
+    peak = abs(np.sum(measure * np.exp(-(np.pi**2) * k**2 / 6)))
+    # a ring is averaged least in the direction of the pixel's sides: the envelope of sinc(k)
+    measure /= np.sqrt(1 + (np.pi * k) ** 2)
     passed = np.ones_like(k) if level < 0 else plan.lowpass(k, level)
     band = measure * (passed - plan.lowpass(k, level + 1))
-    kernel = np.abs(special.j0(2 * np.pi * np.outer(r, k)) @ band) / abs(measure.sum())
+    kernel = np.abs(special.j0(2 * np.pi * np.outer(r, k)) @ band) / peak
     return r, np.maximum.accumulate(kernel[::-1])[::-1]
