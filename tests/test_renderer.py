@@ -7,7 +7,7 @@ from scipy import integrate, special
 
 import napari_issis as ni
 from napari_issis.render import render
-from quadrature import disc_rate
+from quadrature import brightness, disc_rate, pixel_share
 from quadrature import rate as quadrature_rate
 
 CPS = 1.14e17  # NUV, the paper's
@@ -112,16 +112,17 @@ def test_uniform_ellipses_of_any_size(disc):
     assert np.abs(got - expected).max() <= 1e-6 * image.max()
 
 
-@pytest.mark.parametrize("obscuration", [0.0, 0.35])
-def test_bare_diffraction_star(obscuration):
+@pytest.mark.parametrize(("obscuration", "angstrom"), [(0.0, 2500), (0.35, 2500), (0.9, 1150)])
+def test_bare_diffraction_star(obscuration, angstrom):
     """Star through a bare annulus: pixel integrals of the closed-form Airy pattern.
 
-    Catches a wrong cut-off, obscuration taken by area instead of by diameter, a missing sinc.
+    Catches a wrong cut-off, obscuration taken by area instead of by diameter, a missing sinc,
+    rings cut off where the pixel averages them least.
     """
-    wavelength, diameter = 2500e-10, 1.7
+    wavelength, diameter = angstrom * 1e-10, 1.7
     x, y = 15.3, 11.8
     observation = ni.Observation(
-        shape=(24, 32), psf=ni.TelescopePSF(diameter, obscuration, wavelength * 1e10)
+        shape=(24, 52), psf=ni.TelescopePSF(diameter, obscuration, angstrom)
     )
     image = ni.count_rate(ni.source("point", x, y, 1e-14), observation, tolerance=1e-6)
     per_pixel = np.pi * diameter / wavelength * np.radians(PIXEL / 3600)
@@ -140,7 +141,7 @@ def test_bare_diffraction_star(obscuration):
         )
 
     node, weight = np.polynomial.legendre.leggauss(24)
-    for py, px in [(12, 15), (11, 16), (14, 15), (0, 0), (23, 31), (12, 25)]:
+    for py, px in [(12, 15), (11, 16), (14, 15), (0, 0), (23, 31), (12, 25), (12, 51)]:
         values = airy((py + 0.5 * node - y)[:, None], px + 0.5 * node - x)
         expected = 1e-14 * CPS * 0.25 * weight @ values @ weight
         assert abs(image[py, px] - expected) <= 1e-6 * image.max()
@@ -233,6 +234,25 @@ def test_whole_pixel_shift(mixed, observation):
     first = ni.count_rate(mixed, observation, tolerance=1e-8)
     second = ni.count_rate(moved, observation, tolerance=1e-8)
     assert np.abs(first[5:, :-3] - second[:-5, 3:]).max() <= 2e-8 * first.max()
+
+
+@pytest.mark.parametrize("n", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("r_half", [300.0, 3000.0])
+def test_centre_of_a_broad_profile(n, r_half):
+    """The cusp of a profile far wider than the frame (catches Gaussians dropped from it)."""
+    sigma = 0.1 / PIXEL * SIGMA_PER_FWHM
+    observation = ni.Observation(shape=(33, 33), psf=ni.GaussianPSF(0.1))
+    table = ni.source("sersic", 16, 16, 1e-14, r_half, 0.0, 0.0, n=n)
+    image = ni.count_rate(table, observation, tolerance=1e-6)
+    node, weight = np.polynomial.legendre.leggauss(20)
+    edges = np.concatenate([[0], np.geomspace(1e-12, 10 * sigma + 2, 300)])
+    half = 0.5 * np.diff(edges)[:, None]
+    r = (edges[:-1, None] + half * (node + 1)).ravel()
+    theta = 2 * np.pi * (np.arange(400) + 0.5) / 400
+    share = pixel_share(np.outer(r, np.cos(theta)), np.outer(r, np.sin(theta)), sigma).mean(1)
+    measure = (half * weight).ravel() * 2 * np.pi * r * brightness("", n, r / r_half) / r_half**2
+    expected = 1e-14 * CPS * np.sum(measure * share)
+    assert abs(image[16, 16] - expected) <= 1e-6 * image.max()
 
 
 def test_flux_arrives():
