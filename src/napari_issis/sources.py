@@ -105,15 +105,15 @@ def source(
         raise ValueError(f"n is {n}, but only sources of kind 'sersic' have an index.")
     columns: dict[str, Any] = {
         "kind": [str(kind)],
-        "x": np.atleast_1d(_plain(x, u.pix)),
-        "y": np.atleast_1d(_plain(y, u.pix)),
-        "flux": np.atleast_1d(_with_unit(flux, FLUX_UNIT)),
-        "r_half": np.atleast_1d(_with_unit(r_half, u.pix)),
-        "ellipticity": np.atleast_1d(_plain(ellipticity, u.dimensionless_unscaled)),
-        "pa": np.atleast_1d(_with_unit(pa, u.deg)),
+        "x": [_plain("x", x, u.pix)],
+        "y": [_plain("y", y, u.pix)],
+        "flux": np.atleast_1d(_with_unit("flux", flux, FLUX_UNIT)),
+        "r_half": np.atleast_1d(_with_unit("r_half", r_half, u.pix)),
+        "ellipticity": [_plain("ellipticity", ellipticity, u.dimensionless_unscaled)],
+        "pa": np.atleast_1d(_with_unit("pa", pa, u.deg)),
     }
     if n is not None:
-        columns["n"] = np.atleast_1d(_plain(n, u.dimensionless_unscaled))
+        columns["n"] = [_plain("n", n, u.dimensionless_unscaled)]
     table = QTable(columns)
     check_sources(table)
     return table
@@ -168,7 +168,12 @@ def random_sources(
         raise ValueError(f"kind is {kind!r}; known: {', '.join(KINDS)}.")
     if flux_distribution not in ("uniform", "log"):
         raise ValueError(f"flux_distribution is {flux_distribution!r}; it is 'uniform' or 'log'.")
-    ny, nx = shape
+    try:
+        ny, nx = (int(side) for side in shape)
+    except (TypeError, ValueError):
+        raise ValueError(f"shape is {shape!r}; give (ny, nx) in pixels.") from None
+    if ny < 1 or nx < 1:
+        raise ValueError(f"shape is {shape!r}; its sides must be 1 or more.")
     rng = np.random.default_rng(seed)
     count = int(n)
     x = rng.uniform(-0.5, nx - 0.5, count)
@@ -221,6 +226,8 @@ def check_sources(
         If a column is missing or a value out of range: the message names the row (from 0),
         the column, the value and what is allowed.
     """
+    if not isinstance(table, Table):
+        raise ValueError(f"sources is {table!r}; give a source table (astropy QTable).")
     missing = [name for name in COLUMNS[:4] if name not in table.colnames]
     if missing:
         raise ValueError(
@@ -278,13 +285,18 @@ def empty_sources() -> QTable:
     return random_sources("point", 0)
 
 
-def _plain(value: Any, unit: u.UnitBase) -> Any:
+def _plain(name: str, value: Any, unit: u.UnitBase) -> float:
     """Return a value as a plain number in ``unit``."""
-    return u.Quantity(value, unit).value if hasattr(value, "unit") else float(value)
+    try:
+        return float(u.Quantity(value, unit).value)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"{name} is {value!r}; it must be a number ({unit or 'no unit'})."
+        ) from None
 
 
-def _with_unit(value: Any, unit: u.UnitBase) -> Any:
-    return value if hasattr(value, "unit") else np.asarray(value, dtype=float) * unit
+def _with_unit(name: str, value: Any, unit: u.UnitBase) -> Any:
+    return value if hasattr(value, "unit") else _plain(name, value, unit) * unit
 
 
 def _limits(name: str, pair: Any, least: float, most: float) -> tuple[float, float]:
