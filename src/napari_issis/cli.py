@@ -71,6 +71,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _Parser().error(str(error))
     except MemoryError:
         _Parser().error("there is not enough memory; choose a smaller frame.")
+    except KeyboardInterrupt:
+        _Parser().exit(130, f"{PROGRAM}: interrupted\n")
     return 0
 
 
@@ -217,7 +219,7 @@ def _expose(
         f"{'-'.join(observation.filters)}, {observation.exposure:g} s, seed {exposure.seed}"
     )
     print(
-        f"sources {light:.4g} cps in the frame, brightest pixel {exposure.counts.max()} counts, "
+        f"sources {max(light, 0.0):.4g} cps in the frame, brightest pixel {exposure.counts.max()} counts, "
         f"sky {exposure.background:.3g} counts per pixel"
     )
     assumed = "assumed, none is published" if observation.psf_assumed else "as given"
