@@ -276,6 +276,7 @@ class _Mesh:
         next_y, next_x = self._widening(2.0, 0.0)
         if self.low_mesh is not None:
             transformed = fft.rfft2(self.low_mesh, workers=-1)
+            self.low_mesh = None  # the largest array of all
             spectrum = transformed * self._filter(spread=True)
             if not self.last:
                 more_y, more_x = self._widening(2.0, 1.0)
