@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from napari.utils.notifications import notification_manager
 from npe2 import PluginManifest
+from qtpy.QtCore import Qt
+from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 from small_scene import SMALL, few_sources
 
@@ -39,11 +41,18 @@ def instrument(scene, qtbot):
     return form
 
 
+def enter(field, text):
+    """Type a text as a user does, and press Enter."""
+    field.native.selectAll()
+    QTest.keyClicks(field.native, text)
+    QTest.keyClick(field.native, Qt.Key.Key_Return)
+
+
 def test_defaults_are_the_papers(form):
     """Catches other defaults than those of the paper's forms."""
     assert same_table(form.table(), source("exponential", 256, 256))
     form.mode.value = "random"
-    form.seed.value = 7
+    form.seed.value = "7"
     assert same_table(form.table(), random_sources("exponential", 100, shape=(64, 80), seed=7))
 
 
@@ -58,7 +67,7 @@ def test_every_kind_and_mode_can_be_added(scene, form):
     kinds, numbers = np.unique(scene.sources["kind"][4:], return_counts=True)
     assert list(numbers) == [11] * 6
     assert len(kinds) == 6
-    assert form.seed.value == 7
+    assert form.seed.number == 7
     scene.wait()
     assert scene.exposure == simulate(scene.sources, SMALL)
 
@@ -92,7 +101,7 @@ def test_a_wrong_value_is_shown_and_adds_nothing(scene, form):
 
 def test_the_form_says_what_is_drawn_by_hand(scene, form):
     form.kind.value = "sersic"
-    form.n.value = 3.5
+    form.n.value = "3.5"
     form.flux.value = "2e-15"
     assert scene.new_source["kind"] == "sersic"
     assert scene.new_source["n"] == 3.5
@@ -103,31 +112,114 @@ def test_the_form_says_what_is_drawn_by_hand(scene, form):
 def test_the_instrument_form_sets_the_observation(scene, instrument):
     instrument.channel.value = "FUV"
     instrument.wheel2.value = "NF1"
-    instrument.exposure.value = 250.0
+    enter(instrument.exposure, "250")
     instrument.frame.value = (256, 256)
-    instrument.seed.value = 3
+    enter(instrument.seed, "3")
     instrument.new_noise.native.click()
     assert scene.observation == SMALL.replace(
         channel="FUV", filters=("open", "NF1"), exposure=250.0, shape=(256, 256)
     )
     assert scene.seed == 4
-    assert instrument.seed.value == 4
+    assert instrument.seed.number == 4
     # 4.9e-3 and 7.2e-12 cps per pixel behind NF1.
     assert "0.00049 cps/px" in instrument.sky.text()
     assert "geocorona 0.00049" in instrument.sky.text()
     assert "7.2e-13" in instrument.sky.text()
 
 
+@pytest.mark.parametrize(
+    ("typed", "seconds"), [("1e3", 1000.0), ("1000", 1000.0), (" 12.5 ", 12.5), (".004", 0.004)]
+)
+def test_an_exposure_is_read_as_typed(scene, instrument, typed, seconds):
+    """Catches 1e3 that is read as 13: fields that drop keys."""
+    enter(instrument.exposure, typed)
+    assert scene.observation.exposure == seconds
+
+
+@pytest.mark.parametrize("typed", ["12,5", "1,000", "1_000", "1e", "nan", "1e999", "0", "-3", ""])
+def test_what_is_no_exposure_changes_nothing(scene, instrument, typed):
+    """Catches 12,5 that is read as 125; the text stays, red, until it is corrected."""
+    enter(instrument.exposure, "7")
+    field = instrument.exposure.native
+    field.clear()
+    enter(instrument.exposure, typed)
+    instrument.channel.value = "FUV"
+    assert scene.observation == SMALL.replace(exposure=7.0, channel="FUV")
+    assert field.text() == typed
+    assert "exposure" in field.toolTip()
+    assert "#b00020" in field.styleSheet()
+    enter(instrument.exposure, "8")
+    assert scene.observation.exposure == 8.0
+    assert field.styleSheet() == ""
+
+
+@pytest.mark.parametrize("name", ["x", "y", "flux", "r_half", "ellipticity", "pa", "n"])
+def test_source_parameters_are_read_as_typed(scene, form, name):
+    """Catches 5e-1 that is read as 51, and 0,5 as 5 or 0.5: nobody knows which is meant."""
+    notification_manager.records.clear()
+    form.kind.value = "sersic"
+    field = getattr(form, name)
+    enter(field, "5e-1")
+    form.button.native.click()
+    assert getattr(scene.sources[-1][name], "value", scene.sources[-1][name]) == 0.5
+    enter(field, "0,5")
+    form.button.native.click()
+    assert len(scene.sources) == 5
+    assert f"{name} is '0,5'" in str(notification_manager.records[-1].message)
+    assert field.native.styleSheet()
+
+
+def test_limits_outside_the_allowed_are_marked(form):
+    """Catches a form that shows its errors only when the button is pressed."""
+    form.kind.value = "sersic"
+    for field, text in (
+        (form.flux, "-1"),
+        (form.ellipticity, "1"),
+        (form.r_half, "0"),
+        (form.n, "9"),
+        (form.e_limits.high, "1.5"),
+        (form.seed, "1.5"),
+    ):
+        assert field.native.styleSheet() == ""
+        enter(field, text)
+        assert "#b00020" in field.native.styleSheet()
+        assert text in field.native.toolTip()
+
+
+@pytest.mark.parametrize("exposure", [123.4567, 0.0042, 1.23456789012345678e9])
+def test_the_panel_keeps_what_a_script_set(scene, instrument, exposure):
+    """Catches a panel that rounds the exposure, or refuses it, when the channel changes."""
+    instrument.resume()
+    scene.observation = SMALL.replace(exposure=exposure)
+    instrument.channel.value = "FUV"
+    instrument.exposure.native.editingFinished.emit()
+    assert scene.observation == SMALL.replace(exposure=exposure, channel="FUV")
+    assert instrument.exposure.number == exposure
+    instrument.pause()
+
+
+def test_any_value_set_by_a_script_is_shown(scene, instrument):
+    """Catches a panel that raises in the event of a seed or an exposure beyond its range."""
+    instrument.resume()
+    scene.seed = 2**63
+    scene.observation = SMALL.replace(exposure=3e7)
+    assert instrument.seed.number == 2**63
+    assert instrument.exposure.number == 3e7
+    instrument.new_noise.native.click()
+    assert scene.seed == 2**63 + 1
+    instrument.pause()
+
+
 def test_the_instrument_form_follows_scripts_only_while_shown(scene, instrument):
     """Catches forms that work while nobody sees them."""
     instrument.resume()
     scene.observation = SMALL.replace(exposure=7.0)
-    assert instrument.exposure.value == 7.0
+    assert instrument.exposure.number == 7.0
     instrument.pause()
     scene.observation = SMALL.replace(exposure=8.0)
-    assert instrument.exposure.value == 7.0
+    assert instrument.exposure.number == 7.0
     instrument.resume()
-    assert instrument.exposure.value == 8.0
+    assert instrument.exposure.number == 8.0
     assert "given by a script" in instrument.psf.text()
     scene.observation = SMALL.replace(psf=None)
     assert "assumed" in instrument.psf.text()

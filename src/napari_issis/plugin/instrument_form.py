@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from magicgui.widgets import ComboBox, FloatSpinBox, PushButton, SpinBox
+from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
 
 from ..instrument import CHANNELS, FILTERS, FRAME_SIZES, PIXEL_SCALE, PSF_NOTE
 from ..observation import Observation
 from .form import Form
+from .number_field import NumberField, SeedField
 from .scene import Scene
 
 # Black on amber is readable in napari's dark and light themes.
@@ -35,15 +36,18 @@ class InstrumentForm(Form):
         wheel = "Filter wheels: open, or a neutral filter that passes 0.1 (NF1) or 0.01 (NF2)"
         self.wheel1 = ComboBox(choices=list(FILTERS), tooltip=wheel)
         self.wheel2 = ComboBox(choices=list(FILTERS), tooltip=wheel)
-        self.exposure = FloatSpinBox(
-            min=0.001, max=1e7, step=10.0, value=100.0, tooltip="Exposure time in seconds"
+        self.exposure = NumberField(
+            "exposure",
+            scene.observation.exposure,
+            "Exposure time in seconds; takes effect with Enter",
+            check=lambda seconds: Observation(exposure=seconds),
         )
         self.frame = ComboBox(
             choices=_frames((512, 512)),
-            tooltip="Size of the frame in pixels; the sources stay where they are",
+            tooltip="Frame in pixels (and its width); the sources stay where they are",
         )
-        self.seed = SpinBox(
-            min=0, max=2**31 - 1, value=0, tooltip="Seed of the Poisson noise of the picture"
+        self.seed = SeedField(
+            "seed", scene.seed, "Seed of the Poisson noise of the picture; takes effect with Enter"
         )
         self.new_noise = PushButton(text="&New noise", tooltip="Draw the noise anew (next seed)")
         self.add("Channel", self.channel)
@@ -55,14 +59,16 @@ class InstrumentForm(Form):
         self.psf = self.add_text(PSF_NOTE)
         self.warning = self.add_text("Limits of HST ACS/SBC, the nearest analogue")
         self.warning.setStyleSheet(WARNING_STYLE)
-        # A value that is being typed takes effect with Enter or when the field is left.
-        for box in (self.exposure, self.seed):
-            box.native.setKeyboardTracking(False)
+        self._shown: tuple[float, int] = (scene.observation.exposure, scene.seed)
         self.show_observation()
         self.show_warnings()
-        for widget in (self.channel, self.wheel1, self.wheel2, self.exposure, self.frame):
-            widget.changed.connect(self._apply)
-        self.seed.changed.connect(self._apply_seed)
+        self.channel.changed.connect(lambda name: self._apply(channel=name))
+        for wheel_box in (self.wheel1, self.wheel2):
+            wheel_box.changed.connect(self._apply_filters)
+        self.frame.changed.connect(lambda shape: self._apply(shape=shape))
+        # What is being typed takes effect with Enter or when the field is left.
+        self.exposure.native.editingFinished.connect(self._apply_exposure)
+        self.seed.native.editingFinished.connect(self._apply_seed)
         self.new_noise.changed.connect(self._draw_noise)
 
     def resume(self) -> None:
@@ -87,12 +93,17 @@ class InstrumentForm(Form):
             (self.channel, observation.channel),
             (self.wheel1, observation.filters[0]),
             (self.wheel2, observation.filters[1]),
-            (self.exposure, observation.exposure),
             (self.frame, observation.shape),
-            (self.seed, self.scene.seed),
         ):
             with widget.changed.blocked():
                 widget.value = value
+        # What the user is typing, or has to correct, stays unless the value itself changed.
+        exposure, seed = self._shown
+        self._shown = observation.exposure, self.scene.seed
+        if exposure != observation.exposure:
+            self.exposure.number = observation.exposure
+        if seed != self.scene.seed:
+            self.seed.number = self.scene.seed
         self.sky.setText(_sky_text(observation))
         self.psf.setText(
             "PSF: assumed, about 0.10″ FWHM; none is published"
@@ -107,24 +118,36 @@ class InstrumentForm(Form):
         self.warning.setText(text)
         self.show_row(self.warning, bool(text))
 
-    def _apply(self, event: Any = None) -> None:
+    def _apply(self, **change: Any) -> None:
         try:
-            self.scene.observation = self.scene.observation.replace(
-                channel=self.channel.value,
-                filters=(self.wheel1.value, self.wheel2.value),
-                exposure=self.exposure.value,
-                shape=self.frame.value,
-            )
+            self.scene.observation = self.scene.observation.replace(**change)
         except ValueError as error:
             show_error(str(error))
         self.show_observation()
 
-    def _apply_seed(self, seed: int) -> None:
-        self.scene.seed = seed
+    def _apply_filters(self, event: Any = None) -> None:
+        self._apply(filters=(self.wheel1.value, self.wheel2.value))
+
+    def _apply_exposure(self) -> None:
+        if (exposure := _valid(self.exposure)) is not None:
+            self._apply(exposure=exposure)
+
+    def _apply_seed(self) -> None:
+        if (seed := _valid(self.seed)) is not None:
+            self.scene.seed = int(seed)
+            self.show_observation()
 
     def _draw_noise(self, event: Any = None) -> None:
         self.scene.new_noise()
         self.show_observation()
+
+
+def _valid(field: NumberField) -> float | None:
+    """Read a field; an invalid one stays as it is, marked red."""
+    try:
+        return field.number
+    except ValueError:
+        return None
 
 
 def _channel_text(name: str) -> str:
@@ -136,7 +159,7 @@ def _frames(shape: tuple[int, int]) -> list[tuple[str, tuple[int, int]]]:
     sizes = [(n, n) for n in FRAME_SIZES]
     if shape not in sizes:
         sizes.append(shape)
-    return [(f"{nx} × {ny}  ({nx * PIXEL_SCALE:.1f}″ wide)", (ny, nx)) for ny, nx in sizes]
+    return [(f"{nx} × {ny} ({nx * PIXEL_SCALE:.1f}″)", (ny, nx)) for ny, nx in sizes]
 
 
 def _sky_text(observation: Observation) -> str:

@@ -5,15 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from astropy.table import QTable
-from magicgui.widgets import (
-    ComboBox,
-    FloatSpinBox,
-    LineEdit,
-    PushButton,
-    SpinBox,
-)
+from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
-from qtpy.QtWidgets import QAbstractSpinBox, QWidget
+from qtpy.QtWidgets import QWidget
 
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -25,6 +19,7 @@ from ..sources import (
     source,
 )
 from .form import Form
+from .number_field import NumberField, SeedField
 from .scene import Scene
 
 KIND_TEXT = {
@@ -44,18 +39,14 @@ N_HELP = "Sérsic index, 0.5 to 8"
 class Limits:
     """Lower and upper limit of a quantity, typed as numbers."""
 
-    def __init__(self, name: str, low: float, high: float, tooltip: str) -> None:
-        self.name = name
-        self.low = LineEdit(value=f"{low:g}", tooltip=f"Lower limit. {tooltip}")
-        self.high = LineEdit(value=f"{high:g}", tooltip=f"Upper limit. {tooltip}")
+    def __init__(self, name: str, label: str, low: float, high: float, tooltip: str) -> None:
+        self.low = _field(name, low, f"Lower limit. {tooltip}", f"{label}, lower limit")
+        self.high = _field(name, high, f"Upper limit. {tooltip}", f"{label}, upper limit")
 
     @property
     def numbers(self) -> tuple[float, float]:
         """The limits."""
-        return (
-            number(f"{self.name}, lower limit", self.low.value),
-            number(f"{self.name}, upper limit", self.high.value),
-        )
+        return self.low.number, self.high.number
 
 
 class SourceForm(Form):
@@ -80,32 +71,28 @@ class SourceForm(Form):
             value="specific",
             tooltip="One source with these parameters, or a random population over the frame",
         )
-        self.x = _real(256.0, -1e6, 1e6, "x, column of the centre, pixels (first pixel: 0)")
-        self.y = _real(256.0, -1e6, 1e6, "y, row of the centre, pixels (first pixel: 0)")
-        for box in (self.x, self.y):
-            # Room for the digits; the arrow keys step as well.
-            box.native.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
-        self.flux = LineEdit(value=f"{DEFAULT_FLUX:g}", tooltip=FLUX_HELP)
-        self.r_half = _real(DEFAULT_R_HALF, 0.01, 1e5, R_HELP)
-        self.ellipticity = _real(DEFAULT_ELLIPTICITY, 0.0, 0.99, E_HELP, 0.05)
-        self.pa = _real(DEFAULT_PA, -360.0, 360.0, PA_HELP, 5.0)
-        self.n = _real(2.0, 0.5, 8.0, N_HELP, 0.5)
+        self.x = _field("x", 256.0, "x, column of the centre, pixels (first pixel: 0)")
+        self.y = _field("y", 256.0, "y, row of the centre, pixels (first pixel: 0)")
+        self.flux = _field("flux", DEFAULT_FLUX, FLUX_HELP)
+        self.r_half = _field("r_half", DEFAULT_R_HALF, R_HELP)
+        self.ellipticity = _field("ellipticity", DEFAULT_ELLIPTICITY, E_HELP)
+        self.pa = _field("pa", DEFAULT_PA, PA_HELP)
+        self.n = _field("n", 2.0, N_HELP)
 
         self.number = ComboBox(choices=[1, 10, 100], value=100, tooltip="Number of sources")
         self.distribution = ComboBox(
             choices=[("uniform", "uniform"), ("log-uniform", "log")],
             tooltip="Uniform in flux or in its logarithm",
         )
-        self.flux_limits = Limits("flux", 1e-15, 1e-14, FLUX_HELP)
-        self.r_limits = Limits("half-light radius", 10, 30, R_HELP)
-        self.e_limits = Limits("ellipticity", 0, 0.8, E_HELP)
-        self.pa_limits = Limits("position angle", 0, 180, PA_HELP)
-        self.n_limits = Limits("Sersic index", 0.5, 4, N_HELP)
-        self.seed = SpinBox(
-            min=0,
-            max=2**31 - 1,
-            value=1,
-            tooltip="Seed of the population; goes up by one with each, so that none is repeated",
+        self.flux_limits = Limits("flux", "flux", 1e-15, 1e-14, FLUX_HELP)
+        self.r_limits = Limits("r_half", "half-light radius", 10, 30, R_HELP)
+        self.e_limits = Limits("ellipticity", "ellipticity", 0, 0.8, E_HELP)
+        self.pa_limits = Limits("pa", "position angle", 0, 180, PA_HELP)
+        self.n_limits = Limits("n", "Sersic index", 0.5, 4, N_HELP)
+        self.seed = SeedField(
+            "seed",
+            1,
+            "Seed of the population; goes up by one with each, so that none is repeated",
         )
         self.button = PushButton(text="&Add source(s)", tooltip="Add to the scene")
 
@@ -154,7 +141,7 @@ class SourceForm(Form):
         """
         kind = self.kind.value
         if self.mode.value == "specific":
-            return source(x=self.x.value, y=self.y.value, **self._one())
+            return source(x=self.x.number, y=self.y.number, **self._one())
         ranges: dict[str, Any] = {}
         if kind != "point":
             ranges.update(
@@ -170,7 +157,7 @@ class SourceForm(Form):
             shape=self.scene.observation.shape,
             flux=self.flux_limits.numbers,
             flux_distribution=self.distribution.value,
-            seed=self.seed.value,
+            seed=self.seed.number,
             **ranges,
         )
 
@@ -182,27 +169,27 @@ class SourceForm(Form):
             show_error(str(error))
             return
         if self.mode.value == "random":
-            self.seed.value += 1
+            self.seed.number += 1
 
     def _one(self) -> dict[str, Any]:
         kind = self.kind.value
-        return {
-            "kind": kind,
-            "flux": number("flux", self.flux.value),
-            "r_half": self.r_half.value,
-            "ellipticity": self.ellipticity.value,
-            "pa": self.pa.value,
-            "n": self.n.value if kind == "sersic" else None,
-        }
+        one: dict[str, Any] = {"kind": kind, "flux": self.flux.number}
+        if kind != "point":
+            one.update(
+                r_half=self.r_half.number,
+                ellipticity=self.ellipticity.number,
+                pa=self.pa.number,
+                n=self.n.number if kind == "sersic" else None,
+            )
+        return one
 
     def _describe_drawn(self, event: Any = None) -> None:
         try:
             one = self._one()
-            source(x=0, y=0, **one)
         except ValueError:
             # Half typed: what was valid last stays.
             return
-        self.scene.new_source = one
+        self.scene.new_source = {**self.scene.new_source, "n": None, **one}
 
     def _show_fields(self, event: Any = None) -> None:
         specific = self.mode.value == "specific"
@@ -217,19 +204,12 @@ class SourceForm(Form):
         self._describe_drawn()
 
 
-def number(name: str, text: str) -> float:
-    """Read a number that was typed.
-
-    Raises
-    ------
-    ValueError
-        If it is none; the message names the field.
-    """
-    try:
-        return float(text.strip().replace(",", "."))
-    except ValueError:
-        raise ValueError(f"{name} is {text!r}; it must be a number such as 1e-14.") from None
-
-
-def _real(value: float, low: float, high: float, tooltip: str, step: float = 1.0) -> FloatSpinBox:
-    return FloatSpinBox(value=value, min=low, max=high, step=step, tooltip=tooltip)
+def _field(name: str, value: float, tooltip: str, label: str = "") -> NumberField:
+    """Make a field for one of the numbers of `source`, with its limits."""
+    default: dict[str, Any] = {"x": 0.0, "y": 0.0, "n": 2.0}
+    return NumberField(
+        label or name,
+        value,
+        tooltip,
+        check=lambda number: source("sersic", **{**default, name: number}),
+    )
