@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .counts import checked_seed, poisson_counts
 from .limits import CountRateWarning, count_rate_warnings
-from .observation import Observation
+from .observation import OPEN, Observation
 from .render import render
 
 
@@ -132,8 +132,11 @@ def noise_ready_rate(
 ) -> tuple[NDArray[np.float64], float]:
     """Count rate of the sources with ripple below zero removed, and the largest one removed.
 
-    Accurate enough for drawing counts, see `simulate`; independent of the exposure time.
+    Accurate enough for drawing counts, see `simulate`. Independent of the exposure time; the
+    neutral filters scale the rate at open-open and render nothing.
     """
+    transmittance = observation.transmittance
+    observation = observation.replace(filters=OPEN)
     if tolerance is None:
         sky = observation.sky_rate
         rate = (
@@ -144,7 +147,7 @@ def noise_ready_rate(
     else:
         rate = render(sources, observation, tolerance=tolerance)
     lowest = float(rate.min(initial=0.0))
-    return np.maximum(rate, 0.0), max(-lowest, 0.0)
+    return np.maximum(rate, 0.0) * transmittance, max(-lowest, 0.0) * transmittance
 
 
 def expose(

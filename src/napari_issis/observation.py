@@ -13,6 +13,7 @@ from .instrument import CHANNELS, FILTERS, PIXEL_SCALE, Channel
 from .psf import PSF
 
 INSTRUMENTS = ("ISSIS",)
+OPEN = ("open", "open")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ class Observation:
     """
 
     channel: str = "NUV"
-    filters: tuple[str, str] = ("open", "open")
+    filters: tuple[str, str] = OPEN
     exposure: float = 100.0
     shape: tuple[int, int] = (512, 512)
     psf: PSF | None = None

@@ -174,7 +174,7 @@ def test_preview_renders_only_what_moves(scene, mouse, monkeypatch):
     assert np.abs(previews[-1] - final.counts).max() <= 1
 
 
-def test_a_new_exposure_or_seed_renders_nothing(scene, monkeypatch):
+def test_exposure_seed_and_neutral_filters_render_nothing(scene, monkeypatch):
     """Catches a rate that is rendered anew though it is known."""
 
     def refuse(*args, **options):
@@ -182,7 +182,7 @@ def test_a_new_exposure_or_seed_renders_nothing(scene, monkeypatch):
 
     monkeypatch.setattr(picture, "noise_ready_rate", refuse)
     monkeypatch.setattr(picture, "count_rate", refuse)
-    scene.observation = SMALL.replace(exposure=500.0)
+    scene.observation = SMALL.replace(exposure=500.0, filters=("NF1", "NF2"))
     scene.seed = 4
     scene.new_noise()
     assert scene.seed == 5

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..exposure import Exposure, expose, noise_ready_rate, same_table
 from ..limits import count_rate_warnings
-from ..observation import Observation
+from ..observation import OPEN, Observation
 from ..render import count_rate
 
 Array = NDArray[np.float64]
@@ -66,28 +66,31 @@ class PictureMaker:
         seed: int,
     ) -> Picture:
         """Make a picture in which only the moving sources are rendered anew."""
-        key = _rate_key(observation)
-        if drag.rest is None or drag.rest[0] != key:
-            drag.rest = (key, self._rest(drag, observation))
+        rendered = _rendered(observation)
+        if drag.rest is None or drag.rest[0] != rendered:
+            drag.rest = (rendered, self._rest(drag, rendered))
         moving = np.isin(source_id, drag.source_id, invert=True)
         moving |= np.isin(source_id, list(drag.moving))
         rate = drag.rest[1]
         if moving.any():
-            moved = count_rate(sources[moving], observation, tolerance=PREVIEW_TOLERANCE)
+            moved = count_rate(sources[moving], rendered, tolerance=PREVIEW_TOLERANCE)
             rate = np.maximum(rate + moved, 0.0)
+        rate = rate * observation.transmittance
         return Picture(expose(rate, sources, observation, seed=seed), final=False)
 
     def _rate(self, sources: QTable, observation: Observation) -> tuple[Array, float]:
-        if not self._keeps(sources, observation):
-            rate, clipped = noise_ready_rate(sources, observation)
-            self._kept = (sources, _rate_key(observation), rate, clipped)
+        rendered = _rendered(observation)
+        if not self._keeps(sources, rendered):
+            rate, clipped = noise_ready_rate(sources, rendered)
+            self._kept = (sources, rendered, rate, clipped)
         assert self._kept is not None
-        return self._kept[2], self._kept[3]
+        _, _, rate, clipped = self._kept
+        return rate * observation.transmittance, clipped * observation.transmittance
 
     def _keeps(self, sources: QTable, observation: Observation) -> bool:
         return (
             self._kept is not None
-            and self._kept[1] == _rate_key(observation)
+            and self._kept[1] == _rendered(observation)
             and same_table(self._kept[0], sources)
         )
 
@@ -104,6 +107,6 @@ class PictureMaker:
         return noise_ready_rate(drag.sources[~moving], observation)[0]
 
 
-def _rate_key(observation: Observation) -> Observation:
-    """Return the observation less what the rate does not depend on."""
-    return observation.replace(exposure=1.0, pointing=None, roll=0.0)
+def _rendered(observation: Observation) -> Observation:
+    """Return the observation less what needs no rendering: at open-open, for one second."""
+    return observation.replace(filters=OPEN, exposure=1.0, pointing=None, roll=0.0)
