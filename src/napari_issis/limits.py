@@ -13,7 +13,7 @@ class CountRateWarning(UserWarning):
 
 
 def count_rate_warnings(rate: NDArray[np.float64], sky_rate: float) -> list[str]:
-    """Sentences for each limit that the scene breaks; an empty list if none.
+    """Sentences for each limit that the scene breaks, the last with the cure; none if none.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def count_rate_warnings(rate: NDArray[np.float64], sky_rate: float) -> list[str]
     if total > LIMITS.total:
         messages.append(
             f"The frame receives {total:.3g} cps; a detector such as HST's SBC is linear up to "
-            f"{LIMITS.total:.0e} cps. {_cure(total / LIMITS.total)}"
+            f"{LIMITS.total:.0e} cps."
         )
     local = rate + sky_rate
     peak = float(local.max())
@@ -44,9 +44,10 @@ def count_rate_warnings(rate: NDArray[np.float64], sky_rate: float) -> list[str]
         pixels = "1 pixel receives" if count == 1 else f"{count} pixels receive"
         messages.append(
             f"{pixels} more than {LIMITS.local:g} cps, at most {peak:.3g} cps at x = {x}, "
-            f"y = {y}; a detector such as HST's SBC counts linearly below that. "
-            f"{_cure(peak / LIMITS.local)}"
+            f"y = {y}; a detector such as HST's SBC counts linearly below that."
         )
+    if messages:
+        messages[-1] += f" {_cure(max(total / LIMITS.total, peak / LIMITS.local))}"
     return messages
 
 
