@@ -51,6 +51,20 @@ def test_what_fits_cannot_hold_is_refused(tmp_path):
         write_fits(str(tmp_path / "nowhere" / "e.fits"), np.ones((3, 3)), {"metadata": {}})
 
 
+@pytest.mark.parametrize("name", ["field", "field.v2"])
+def test_a_name_without_suffix_gets_one(scene, viewer, tmp_path, name):
+    """Catches names that are refused, and a file lost about which nobody was asked."""
+    other = viewer.add_image(np.eye(3))
+    for layer in (scene.counts.layer, other):
+        path = tmp_path / f"{layer.name} {name}"
+        assert save(layer, path) == [f"{path}.fits"]
+        before = (tmp_path / f"{path.name}.fits").read_bytes()
+        with pytest.raises(FileExistsError, match="exists already"):
+            save(layer, path)
+        assert (tmp_path / f"{path.name}.fits").read_bytes() == before
+        save(layer, f"{path}.fits")
+
+
 def test_layers_with_our_mark_become_a_scene(viewer, scene, tmp_path):
     """Catches marked layers (a sample's) that the next scene does not recognise."""
     from napari.components import ViewerModel

@@ -8,7 +8,7 @@ import numpy as np
 from astropy.io import fits
 
 from ..exposure import Exposure
-from ..fits_io import write_exposure
+from ..fits_io import SUFFIXES, write_exposure
 from ..safe_write import replacing
 from .marks import MARKER
 
@@ -22,7 +22,8 @@ def write_fits(path: str, data: Any, meta: dict[str, Any]) -> list[str]:
     Parameters
     ----------
     path : str
-        The file.
+        The file; ``.fits`` is appended to a name without a suffix of FITS files, and no
+        existing file is overwritten then, as nobody has been asked about it.
     data : array_like
         The layer's data.
     meta : dict
@@ -40,11 +41,13 @@ def write_fits(path: str, data: Any, meta: dict[str, Any]) -> list[str]:
     OSError
         If the file cannot be written.
     """
+    target = fits_path(path)
+    overwrite = target == path
     mark = meta.get("metadata", {}).get(MARKER, {})
     exposure = mark.get("exposure") if isinstance(mark, dict) else None
     if isinstance(exposure, Exposure) and np.array_equal(exposure.counts, data):
-        write_exposure(exposure, path, overwrite=True)
-        return [path]
+        write_exposure(exposure, target, overwrite=overwrite)
+        return [target]
     image = np.asarray(data)
     if image.dtype == bool:
         image = image.astype(np.uint8)
@@ -55,6 +58,11 @@ def write_fits(path: str, data: Any, meta: dict[str, Any]) -> list[str]:
         )
     if image.dtype == np.float16:
         image = image.astype(np.float32)
-    with replacing(path, (".fits", ".fit", ".fts"), overwrite=True) as file:
+    with replacing(target, SUFFIXES, overwrite=overwrite) as file:
         fits.PrimaryHDU(image).writeto(file)
-    return [path]
+    return [target]
+
+
+def fits_path(path: str) -> str:
+    """Return the path with ``.fits`` appended unless it ends as those of FITS files do."""
+    return path if path.lower().endswith(SUFFIXES) else f"{path}.fits"
