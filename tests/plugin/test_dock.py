@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from napari.utils.notifications import notification_manager
 from npe2 import PluginManifest
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QPoint, QPointF, Qt
+from qtpy.QtGui import QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 from small_scene import SMALL, few_sources
@@ -50,7 +51,7 @@ def enter(field, text):
 
 def test_defaults_are_the_papers(form):
     """Catches other defaults than those of the paper's forms."""
-    assert same_table(form.table(), source("exponential", 256, 256))
+    assert same_table(form.table(), source("exponential", 40, 32))
     form.mode.value = "random"
     form.seed.value = "7"
     assert same_table(form.table(), random_sources("exponential", 100, shape=(64, 80), seed=7))
@@ -72,15 +73,64 @@ def test_every_kind_and_mode_can_be_added(scene, form):
     assert scene.exposure == simulate(scene.sources, SMALL)
 
 
-def test_fields_that_do_not_matter_are_disabled(form):
-    form.kind.value = "point"
-    assert not form.r_half.native.isEnabled()
-    assert not form.pa_limits.low.native.parent().isEnabled()
-    form.kind.value = "exponential"
-    assert form.r_half.native.isEnabled()
-    assert not form.n.native.isEnabled()
-    form.kind.value = "sersic"
-    assert form.n.native.isEnabled()
+def test_only_fields_that_matter_are_shown(form):
+    """Catches rows that push others out of sight though they have no effect."""
+    shown = {
+        "point": "",
+        "exponential": "r_half ellipticity pa",
+        "sersic": "r_half ellipticity pa n",
+    }
+    for kind, names in shown.items():
+        form.kind.value = kind
+        form.mode.value = "specific"
+        for name in ("r_half", "ellipticity", "pa", "n"):
+            assert getattr(form, name).native.isHidden() == (name not in names.split())
+        assert form.r_limits.low.native.parent().isHidden()
+        form.mode.value = "random"
+        assert form.r_half.native.isHidden()
+        assert form.r_limits.low.native.parent().isHidden() == (kind == "point")
+        assert form.n_limits.low.native.parent().isHidden() == (kind != "sersic")
+
+
+def test_the_place_offered_is_the_centre_of_the_frame(scene, form):
+    """Catches sources that are added outside a small frame, and typed places that are lost."""
+    form.resume()
+    assert (form.x.number, form.y.number) == (40, 32)
+    scene.observation = SMALL.replace(shape=(512, 512))
+    assert (form.x.number, form.y.number) == (256, 256)
+    enter(form.y, "10.5")
+    scene.observation = SMALL.replace(shape=(2048, 2048))
+    assert (form.x.number, form.y.number) == (256, 10.5)
+    form.pause()
+
+
+def wheel(widget):
+    point = QPointF(widget.rect().center())
+    event = QWheelEvent(
+        point,
+        widget.mapToGlobal(point),
+        QPoint(0, 0),
+        QPoint(0, -120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(widget, event)
+
+
+def test_the_wheel_changes_no_field_it_passes_over(scene, instrument, form, monkeypatch):
+    """Catches channels and frames that change while the panel is scrolled."""
+    before = scene.observation
+    boxes = [instrument.channel, instrument.wheel1, instrument.frame, form.kind, form.mode]
+    values = [box.value for box in boxes]
+    for box in boxes:
+        wheel(box.native)
+    assert [box.value for box in boxes] == values
+    assert scene.observation == before
+    monkeypatch.setattr(instrument.wheel1.native, "hasFocus", lambda: True)
+    wheel(instrument.wheel1.native)
+    assert scene.observation.filters == ("NF1", "open")
 
 
 def test_a_wrong_value_is_shown_and_adds_nothing(scene, form):
@@ -253,6 +303,41 @@ def test_save_fits(scene, qtbot, tmp_path, monkeypatch):
     assert "does not exist" in str(notification_manager.records[-1].message)
     monkeypatch.setattr(widget, "ask_path", lambda: None)
     widget.save.native.click()
+
+
+def test_save_fits_appends_the_suffix(scene, qtbot, tmp_path, monkeypatch):
+    """Catches names such as field.v2 that are refused, and overwriting without a question."""
+    widget = SimulatorWidget(scene.viewer)
+    qtbot.addWidget(widget)
+    monkeypatch.setattr(widget, "ask_path", lambda: str(tmp_path / "field.v2"))
+    widget.save.native.click()
+    assert Exposure.read(tmp_path / "field.v2.fits") == scene.exposure
+    (tmp_path / "field.v2.fits").write_text("mine")
+    widget.save.native.click()
+    assert (tmp_path / "field.v2.fits").read_text() == "mine"
+
+
+@pytest.mark.needs_gl
+def test_the_buttons_are_in_sight_and_have_keys_of_their_own(make_napari_viewer, qtbot):
+    """Catches a button below the fold on a small screen, and keys that napari has already."""
+    viewer = make_napari_viewer(show=True)
+    scene = open_scene(few_sources(), SMALL, viewer=viewer)
+    viewer.window.resize(1366, 738)
+    widget = next(iter(viewer.window.dock_widgets.values()))
+    scene.add(source("point", 30, 30, flux=1e-11))
+    scene.wait()
+    widget.sources.kind.value = "sersic"
+    widget.sources.mode.value = "random"
+    QApplication.processEvents()
+    for button in (widget.sources.button.native, widget.save.native):
+        assert button.visibleRegion().boundingRect().size() == button.size()
+    menus = [action.text() for action in viewer.window._qt_window.menuBar().actions()]
+    taken = {text[text.index("&") + 1].upper() for text in menus if "&" in text} | {"S", "C"}
+    for button in (widget.sources.button, widget.save, widget.instrument.new_noise):
+        text = button.native.text()
+        key = text[text.index("&") + 1].upper()
+        assert key not in taken
+        taken.add(key)
 
 
 def test_the_menu_makes_a_scene_in_its_viewer(make_napari_viewer_proxy, npe2pm):

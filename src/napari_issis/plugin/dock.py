@@ -8,11 +8,12 @@ from magicgui.widgets import PushButton
 from napari.utils.notifications import show_error, show_info
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QHideEvent, QShowEvent
-from qtpy.QtWidgets import QFileDialog, QFrame, QScrollArea, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QFileDialog, QFrame, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from .instrument_form import InstrumentForm
 from .scene import open_scene
 from .source_form import SourceForm
+from .writer import fits_path
 
 DOCK_NAME = "ISSIS simulator"
 
@@ -32,7 +33,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.instrument = InstrumentForm(self.scene)
         self.sources = SourceForm(self.scene)
         self.save = PushButton(
-            text="&Save FITS…", tooltip="Save counts, expected counts and sources as a FITS file"
+            text="Sav&e FITS…", tooltip="Save counts, expected counts and sources as a FITS file"
         )
         self.save.changed.connect(self.save_fits)
         self._following = False
@@ -52,7 +53,11 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 4)
         layout.addWidget(scroll)
-        layout.addWidget(self.save.native)
+        buttons = QHBoxLayout()
+        buttons.setContentsMargins(4, 0, 4, 0)
+        buttons.addWidget(self.sources.button.native)
+        buttons.addWidget(self.save.native)
+        layout.addLayout(buttons)
         self.setMinimumWidth(330)
 
     def save_fits(self, event: Any = None) -> None:
@@ -60,13 +65,14 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         path = self.ask_path()
         if path is None:
             return
+        target = fits_path(path)
         try:
-            # The dialog has asked before choosing a file that exists.
-            self.scene.exposure.write(path, overwrite=True)
+            # The dialog has asked before choosing a file that exists, by the name typed.
+            self.scene.exposure.write(target, overwrite=target == path)
         except (OSError, ValueError, RuntimeError) as error:
             show_error(str(error))
         else:
-            show_info(f"Saved {path}")
+            show_info(f"Saved {target}")
 
     def ask_path(self) -> str | None:
         """Ask for the file to write; None if the user changed his mind."""
@@ -80,6 +86,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         if not self._following:
             self._following = True
             self.instrument.resume()
+            self.sources.resume()
         super().showEvent(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -87,6 +94,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         if self._following:
             self._following = False
             self.instrument.pause()
+            self.sources.pause()
         super().hideEvent(event)
 
 

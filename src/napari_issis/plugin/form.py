@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from magicgui.widgets.bases import ValueWidget
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QEvent, QObject, Qt
 from qtpy.QtWidgets import (
     QComboBox,
     QFormLayout,
@@ -33,6 +33,8 @@ class Form(QGroupBox):  # type: ignore[misc]
         """Add a row; return the field, which `show_row` shows or hides."""
         for widget in widgets:
             _narrow(widget.native)
+            widget.native.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+            widget.native.installEventFilter(self)
         if len(widgets) == 1:
             field = widgets[0].native
         else:
@@ -68,12 +70,12 @@ class Form(QGroupBox):  # type: ignore[misc]
         if label is not None:
             label.setVisible(visible)
 
-    def enable_row(self, field: QWidget, enabled: bool) -> None:
-        """Enable or disable a row with its label."""
-        field.setEnabled(enabled)
-        label = self._rows.labelForField(field)
-        if label is not None:
-            label.setEnabled(enabled)
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Let the wheel scroll the panel, not change a field that it happens to pass over."""
+        if event.type() == QEvent.Type.Wheel and not watched.hasFocus():
+            event.ignore()
+            return True
+        return bool(super().eventFilter(watched, event))
 
 
 def _narrow(native: QWidget) -> None:

@@ -81,8 +81,8 @@ class SourceForm(Form):
 
         self.number = ComboBox(choices=[1, 10, 100], value=100, tooltip="Number of sources")
         self.distribution = ComboBox(
-            choices=[("uniform", "uniform"), ("log-uniform", "log")],
-            tooltip="Uniform in flux or in its logarithm",
+            choices=["uniform", "log"],
+            tooltip="Fluxes uniform between the limits, or their logarithms",
         )
         self.flux_limits = Limits("flux", "flux", 1e-15, 1e-14, FLUX_HELP)
         self.r_limits = Limits("r_half", "half-light radius", 10, 30, R_HELP)
@@ -94,32 +94,37 @@ class SourceForm(Form):
             1,
             "Seed of the population; goes up by one with each, so that none is repeated",
         )
+        # The dock shows it below the forms, where it is never scrolled out of sight.
         self.button = PushButton(text="&Add source(s)", tooltip="Add to the scene")
 
         self.add("Kind", self.kind)
         self.add("Mode", self.mode)
-        self._specific = [self.add("x, y (px)", self.x, self.y), self.add(FLUX_LABEL, self.flux)]
-        structure = [
-            self.add("R½ (px)", self.r_half),
-            self.add("Ellipticity", self.ellipticity),
-            self.add("PA (°)", self.pa),
-        ]
-        index = [self.add("Sérsic n", self.n)]
-        self._specific += structure + index
-        self._random = [
-            self.add("Number, F is", self.number, self.distribution),
-            self._add_limits(FLUX_LABEL, self.flux_limits),
-        ]
-        limits = [
-            self._add_limits("R½ (px)", self.r_limits),
-            self._add_limits("Ellipticity", self.e_limits),
-            self._add_limits("PA (°)", self.pa_limits),
-        ]
-        index_limits = [self._add_limits("Sérsic n", self.n_limits)]
-        self._random += [*limits, *index_limits, self.add("Seed", self.seed)]
-        self._structure = structure + limits
-        self._index = index + index_limits
-        self.add("", self.button)
+        self._rows_of = {
+            ("specific", "all"): [
+                self.add("x, y (px)", self.x, self.y),
+                self.add(FLUX_LABEL, self.flux),
+            ],
+            ("specific", "extended"): [
+                self.add("R½ (px)", self.r_half),
+                self.add("Ellipticity", self.ellipticity),
+                self.add("PA (°)", self.pa),
+            ],
+            ("specific", "sersic"): [self.add("Sérsic n", self.n)],
+            ("random", "all"): [
+                self.add("Number", self.number),
+                self.add("Distribution", self.distribution),
+                self._add_limits(FLUX_LABEL, self.flux_limits),
+            ],
+            ("random", "extended"): [
+                self._add_limits("R½ (px)", self.r_limits),
+                self._add_limits("Ellipticity", self.e_limits),
+                self._add_limits("PA (°)", self.pa_limits),
+            ],
+            ("random", "sersic"): [self._add_limits("Sérsic n", self.n_limits)],
+        }
+        self._rows_of["random", "all"].append(self.add("Seed", self.seed))
+        self._centre = self.x.value, self.y.value
+        self.show_centre()
 
         for widget in (self.mode, self.kind):
             widget.changed.connect(self._show_fields)
@@ -127,6 +132,22 @@ class SourceForm(Form):
             field.changed.connect(self._describe_drawn)
         self.button.changed.connect(self.add_sources)
         self._show_fields()
+
+    def resume(self) -> None:
+        """Follow the scene's frame."""
+        self.scene.events.observation.connect(self.show_centre)
+        self.show_centre()
+
+    def pause(self) -> None:
+        """Stop following the scene."""
+        self.scene.events.observation.disconnect(self.show_centre)
+
+    def show_centre(self, event: Any = None) -> None:
+        """Offer the centre of the frame as the place of the next source, unless one was typed."""
+        ny, nx = self.scene.observation.shape
+        if (self.x.value, self.y.value) == self._centre:
+            self.x.number, self.y.number = nx // 2, ny // 2
+            self._centre = self.x.value, self.y.value
 
     def _add_limits(self, label: str, limits: Limits) -> QWidget:
         return self.add(label, limits.low, limits.high)
@@ -192,15 +213,11 @@ class SourceForm(Form):
         self.scene.new_source = {**self.scene.new_source, "n": None, **one}
 
     def _show_fields(self, event: Any = None) -> None:
-        specific = self.mode.value == "specific"
-        for row in self._specific:
-            self.show_row(row, specific)
-        for row in self._random:
-            self.show_row(row, not specific)
-        for row in self._structure:
-            self.enable_row(row, self.kind.value != "point")
-        for row in self._index:
-            self.enable_row(row, self.kind.value == "sersic")
+        kind = self.kind.value
+        applies = {"all": True, "extended": kind != "point", "sersic": kind == "sersic"}
+        for (mode, kinds), rows in self._rows_of.items():
+            for row in rows:
+                self.show_row(row, mode == self.mode.value and applies[kinds])
         self._describe_drawn()
 
 
