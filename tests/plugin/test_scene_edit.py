@@ -265,6 +265,32 @@ def test_a_viewer_with_layers_keeps_them(viewer):
     assert len(scene.sources) == 4
 
 
+def test_the_view_in_a_viewer_with_layers(viewer):
+    """Catches a scene that is a tiny stamp, that turns the user's image, or says nothing of it."""
+    own = viewer.add_image(np.ones((512, 512)), name="mine")
+    orientation = viewer.scene.camera.orientation2d
+    scene = open_scene(few_sources(), SMALL, viewer=viewer, dock=False)
+    scene.wait()
+    camera = viewer.scene.camera
+    assert camera.orientation2d == orientation
+    # 80 pixels of 0.036 arcsec fill most of the canvas, whose shorter side is 600.
+    assert 0.5 * 600 < camera.zoom * 80 * 0.036 <= 800
+    assert camera.center[-2:] == pytest.approx((31.5 * 0.036, 39.5 * 0.036), abs=0.04)
+    told = [text for text in messages() if "arcsec" in text]
+    assert len(told) == 1
+    assert "row 0 drawn at the top" in told[0]
+    for layer in scene.layers:
+        viewer.layers.remove(layer)
+    assert camera.orientation2d == orientation
+    scene.sources = few_sources()
+    assert [text for text in messages() if "arcsec" in text] == told
+    viewer.layers.remove(own)
+
+
+def test_a_viewer_without_other_layers_is_told_nothing(scene):
+    assert not any("arcsec" in text for text in messages())
+
+
 def test_wrong_input_leaves_the_scene_as_it_was(scene):
     before = scene.exposure
     wrong = few_sources()
@@ -309,6 +335,24 @@ def test_changing_the_frame_keeps_the_sources(scene):
     assert_consistent(scene)
     assert same_table(scene.sources, few_sources())
     assert scene.counts.layer.data.shape == (256, 256)
+
+
+def test_edges_are_as_thick_on_the_screen_in_any_frame(scene, mouse):
+    """Catches ellipses that vanish in large frames, also those drawn afterwards."""
+    layer = scene.editor.ellipses.layer
+    for side in (256, 512, 2048):
+        scene.observation = SMALL.replace(shape=(side, side))
+        scene.wait()
+        layer.selected_data = {0}
+        scene.viewer.layers.selection.active = layer
+        layer.mode = "add_ellipse"
+        mouse.drag((10.0, 40.0), (20.0, 45.0), (30.0, 52.0))
+        scene.editor.take_over()
+        # Of a canvas of some 600 pixels.
+        widths = 600 / side * np.array(layer.edge_width)
+        assert np.all((widths >= 1.0) & (widths <= 2.0))
+    assert len(widths) == 5
+    assert_consistent(scene)
 
 
 def test_closing_in_the_middle_of_a_render(scene, qtbot):

@@ -22,12 +22,13 @@ GEOMETRY: dict[str, Any] = {
 POINTS: dict[str, Any] = {
     "name": "ISSIS point sources",
     "symbol": "star",
-    "size": 9.0,
+    "size": 18.0,
     "face_color": "transparent",
     "border_color": "red",
     "border_width": 0.06,
-    # Pixels on the screen: when zoomed in, the marker does not hide the star.
-    "canvas_size_limits": (6, 16),
+    # Pixels on the screen: when zoomed in, the marker does not hide the star. vispy draws the
+    # border of a limited marker at least half as thick as the lower limit.
+    "canvas_size_limits": (2, 16),
     "out_of_slice_display": False,
     **GEOMETRY,
 }
@@ -35,9 +36,11 @@ ELLIPSES: dict[str, Any] = {
     "name": "ISSIS extended sources",
     "face_color": "transparent",
     "edge_color": ELLIPSE_COLORS["exponential"],
-    "edge_width": 0.6,
     **GEOMETRY,
 }
+# Length of the longest side of a frame that fits napari's canvas, and of an ellipse's edge, in
+# pixels of a screen of 1366 x 768.
+CANVAS, EDGE = 600.0, 1.5
 FRAME_COLOR = "#7a7f88"
 COUNTS: dict[str, Any] = {
     "name": "ISSIS counts",
@@ -46,6 +49,11 @@ COUNTS: dict[str, Any] = {
     "gamma": 0.5,
     **GEOMETRY,
 }
+
+
+def edge_width(shape: tuple[int, int]) -> float:
+    """Return the width of the ellipses' edges in pixels of a frame of this shape."""
+    return EDGE * max(shape) / CANVAS
 
 
 def edge_colors(kinds: Iterable[str]) -> list[str]:

@@ -58,6 +58,7 @@ def scene_layers(name: str) -> list[LayerDataTuple]:
     }
     ellipses = {
         **styles.ELLIPSES,
+        "edge_width": styles.edge_width(observation.shape),
         "features": features(sources[~point], ids[~point]),
         "metadata": {MARKER: {"role": "ellipses"}},
     }

@@ -9,12 +9,13 @@ from weakref import WeakValueDictionary
 from astropy.table import QTable, Table
 from napari.layers import Image
 from napari.utils.events import EmitterGroup, Event
-from napari.utils.notifications import show_error
+from napari.utils.notifications import show_error, show_info
 from napari.viewer import Viewer
 from qtpy.QtCore import QEventLoop, QTimer
 from qtpy.QtWidgets import QApplication
 
 from ..exposure import Exposure
+from ..instrument import PIXEL_SCALE
 from ..observation import Observation
 from ..sources import source
 from .counts_layer import CountsLayer
@@ -58,8 +59,10 @@ class Scene:
         self.editor = SourceEditor(self._soon)
         self.counts = CountsLayer()
         self._observation = Observation()
+        self.editor.ellipses.fit(self._observation.shape)
         self._seed = 0
         self._orientation = viewer.scene.camera.orientation2d
+        self._told = False
 
         self._maker = PictureMaker()
         self._jobs = LatestWins(self._show, self._failed)
@@ -121,8 +124,12 @@ class Scene:
             raise ValueError(f"observation is {observation!r}; give an Observation.")
         if observation == self._observation:
             return
+        reframed = observation.shape != self._observation.shape
         self._observation = observation
         self.editor.pivot = observation.channel_data.pivot
+        if reframed:
+            with self.editor.quiet():
+                self.editor.ellipses.fit(observation.shape)
         self.counts.rescale(always=True)
         self._set_up += 1
         self._soon()
@@ -221,9 +228,10 @@ class Scene:
     def use_layers(self, image: Image, points: Any, ellipses: Any) -> None:
         """Take over layers that carry our mark, as a sample has them."""
         exposure = image.metadata[MARKER]["exposure"]
-        self._orient()
         self.counts.layer = image
         self.editor.points.layer, self.editor.ellipses.layer = points, ellipses
+        self._orient()
+        self.viewer.reset_view(layers=[image])
         for layer in self.editor.layers:
             self.editor.listen(layer)
         self.observation, self.seed = exposure.observation, exposure.seed
@@ -238,8 +246,8 @@ class Scene:
     def _ensure_layers(self) -> None:
         """Make the layers that are missing: the image lowest, the points uppermost."""
         layers = self.viewer.layers
-        alone = len(layers) == 0
-        if not self.layers:
+        new = not self.layers
+        if new:
             self._orient()
         if self.counts.layer is None:
             image = self.counts.make(self._observation.shape, self._picture)
@@ -254,12 +262,26 @@ class Scene:
                     below = view is self.editor.ellipses and points is not None
                     layers.insert(layers.index(points) if below else len(layers), view.layer)
                     self.editor.listen(view.layer)
-        if alone:
-            self.viewer.reset_view()
+        if new:
+            self.viewer.reset_view(layers=[self.counts.layer])
+
+    @property
+    def _alone(self) -> bool:
+        """Whether the viewer holds no layers of others."""
+        return all(any(layer is own for own in self.layers) for layer in self.viewer.layers)
 
     def _orient(self) -> None:
-        self._orientation = self.viewer.scene.camera.orientation2d
-        self.viewer.scene.camera.orientation2d = ORIENTATION
+        """Draw row 0 at the bottom, unless that would turn the images of others."""
+        camera = self.viewer.scene.camera
+        self._orientation = camera.orientation2d
+        if self._alone:
+            camera.orientation2d = ORIENTATION
+        elif not self._told:
+            self._told = True
+            text = f"The ISSIS layers are in arcsec ({PIXEL_SCALE} per pixel)"
+            if camera.orientation2d[0] == "down":
+                text += ", with row 0 drawn at the top because the viewer has other layers"
+            show_info(f"{text}.")
 
     def _layer_removed(self, event: Any) -> None:
         if event.value is self.counts.layer:
@@ -331,9 +353,8 @@ class Scene:
             self._ensure_layers()
         self.counts.show(picture)
         shape = picture.exposure.counts.shape
-        alone = all(any(layer is own for own in self.layers) for layer in self.viewer.layers)
-        if alone and (previous is None or previous.exposure.counts.shape != shape):
-            self.viewer.reset_view()
+        if self._alone and (previous is None or previous.exposure.counts.shape != shape):
+            self.viewer.reset_view(layers=[self.counts.layer])
         if picture.final:
             self.events.picture()
         elif self._shown[0] == self._version:

@@ -219,6 +219,14 @@ class EllipsesLayer(SourceLayer):
     """Extended sources as the ellipses that hold half of their light."""
 
     role = "ellipses"
+    _edge_width = 1.0
+
+    def fit(self, shape: tuple[int, int]) -> None:
+        """Make the edges thick enough to be seen, and no thicker, when the frame is."""
+        self._edge_width = styles.edge_width(shape)
+        if self.layer is not None:
+            self.layer.edge_width = self._edge_width
+            self.layer.current_edge_width = self._edge_width
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """All but points."""
@@ -252,6 +260,7 @@ class EllipsesLayer(SourceLayer):
             ndim=2,
             features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
             metadata={MARKER: {"role": self.role}},
+            edge_width=self._edge_width,
             **styles.ELLIPSES,
         )
 
@@ -261,7 +270,7 @@ class EllipsesLayer(SourceLayer):
         self.layer.data = [(corners, "ellipse") for corners in data]
         if len(data):
             self.layer.edge_color = styles.edge_colors(table["kind"])
-            self.layer.edge_width = [styles.ELLIPSES["edge_width"]] * len(data)
+            self.layer.edge_width = [self._edge_width] * len(data)
 
     def recolor(self, kinds: Iterable[str]) -> None:
         """Give each ellipse the colour of its kind."""
