@@ -147,7 +147,7 @@ def noise_ready_rate(
     else:
         rate = render(sources, observation, tolerance=tolerance)
     lowest = float(rate.min(initial=0.0))
-    return np.maximum(rate, 0.0) * transmittance, max(-lowest, 0.0) * transmittance
+    return np.maximum(rate, 0.0) * transmittance, abs(min(lowest, 0.0)) * transmittance
 
 
 def expose(
