@@ -5,6 +5,7 @@ from __future__ import annotations
 import astropy.units as u
 import numpy as np
 import pytest
+from astropy.table import vstack
 from napari.utils.notifications import notification_manager
 from small_scene import SMALL, few_sources
 
@@ -353,6 +354,20 @@ def test_edges_are_as_thick_on_the_screen_in_any_frame(scene, mouse):
         assert np.all((widths >= 1.0) & (widths <= 2.0))
     assert len(widths) == 5
     assert_consistent(scene)
+
+
+@pytest.mark.parametrize("side", [256, 512, 2048])
+def test_markers_suit_the_frame(scene, side):
+    """Catches markers that vanish in large frames, or hide each other and take all clicks."""
+    scene.observation = SMALL.replace(shape=(side, side))
+    scene.sources = vstack([source("point", 100.0, 100.0), source("point", 110.0, 100.0)])
+    layer = scene.editor.points.layer
+    assert np.all(600 / side * layer.size >= 5)
+    if side < 2048:
+        assert np.all(600 / side * layer.size <= 16)
+        assert [layer.get_value((100.0, x)) for x in (100.0, 110.0)] == [0, 1]
+    # vispy makes the border of a limited marker at least half of the lower limit thick.
+    assert layer.canvas_size_limits[0] <= 2
 
 
 def test_closing_in_the_middle_of_a_render(scene, qtbot):

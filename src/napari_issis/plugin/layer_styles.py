@@ -22,7 +22,6 @@ GEOMETRY: dict[str, Any] = {
 POINTS: dict[str, Any] = {
     "name": "ISSIS point sources",
     "symbol": "star",
-    "size": 18.0,
     "face_color": "transparent",
     "border_color": "red",
     "border_width": 0.06,
@@ -38,9 +37,11 @@ ELLIPSES: dict[str, Any] = {
     "edge_color": ELLIPSE_COLORS["exponential"],
     **GEOMETRY,
 }
-# Length of the longest side of a frame that fits napari's canvas, and of an ellipse's edge, in
-# pixels of a screen of 1366 x 768.
-CANVAS, EDGE = 600.0, 1.5
+# On a screen of 1366 x 768, in its pixels: the longest side of a frame that fits napari's canvas,
+# the edge of an ellipse and the width of a marker.
+CANVAS, EDGE, MARKER_WIDTH = 600.0, 1.5, 12.0
+# A click this near (half of it, in pixels of the frame) takes a star; crowded stars need less.
+WIDEST_MARKER = 18.0
 FRAME_COLOR = "#7a7f88"
 COUNTS: dict[str, Any] = {
     "name": "ISSIS counts",
@@ -54,6 +55,11 @@ COUNTS: dict[str, Any] = {
 def edge_width(shape: tuple[int, int]) -> float:
     """Return the width of the ellipses' edges in pixels of a frame of this shape."""
     return EDGE * max(shape) / CANVAS
+
+
+def marker_size(shape: tuple[int, int]) -> float:
+    """Return the size of the markers in pixels of a frame of this shape."""
+    return min(MARKER_WIDTH * max(shape) / CANVAS, WIDEST_MARKER)
 
 
 def edge_colors(kinds: Iterable[str]) -> list[str]:

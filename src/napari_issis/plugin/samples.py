@@ -70,6 +70,7 @@ def scene_layers(name: str) -> list[LayerDataTuple]:
         ellipses["ndim"] = 2
     points = {
         **styles.POINTS,
+        "size": styles.marker_size(observation.shape),
         "features": features(sources[point], ids[point]),
         "metadata": {MARKER: {"role": "points"}},
     }

@@ -59,7 +59,7 @@ class Scene:
         self.editor = SourceEditor(self._soon)
         self.counts = CountsLayer()
         self._observation = Observation()
-        self.editor.ellipses.fit(self._observation.shape)
+        self._fit_marks()
         self._seed = 0
         self._orientation = viewer.scene.camera.orientation2d
         self._told = False
@@ -128,8 +128,7 @@ class Scene:
         self._observation = observation
         self.editor.pivot = observation.channel_data.pivot
         if reframed:
-            with self.editor.quiet():
-                self.editor.ellipses.fit(observation.shape)
+            self._fit_marks()
         self.counts.rescale(always=True)
         self._set_up += 1
         self._soon()
@@ -264,6 +263,11 @@ class Scene:
                     self.editor.listen(view.layer)
         if new:
             self.viewer.reset_view(layers=[self.counts.layer])
+
+    def _fit_marks(self) -> None:
+        with self.editor.quiet():
+            for view in self.editor.views:
+                view.fit(self._observation.shape)
 
     @property
     def _alone(self) -> bool:

@@ -51,6 +51,10 @@ class SourceLayer:
         self._geometry: Array = self.geometry(QTable(), empty=True)
         self._features = pd.DataFrame(columns=[*FEATURES, "source_id"])
 
+    def fit(self, shape: tuple[int, int]) -> None:
+        """Draw the marks so that they suit a frame of this shape."""
+        raise NotImplementedError
+
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Tell which kinds of sources belong on the layer."""
         raise NotImplementedError
@@ -179,6 +183,14 @@ class PointsLayer(SourceLayer):
     """Point sources as stars."""
 
     role = "points"
+    _size = 9.0
+
+    def fit(self, shape: tuple[int, int]) -> None:
+        """Give the markers a size that suits the frame."""
+        self._size = styles.marker_size(shape)
+        if self.layer is not None:
+            self.layer.size = self._size
+            self.layer.current_size = self._size
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Points only."""
@@ -206,6 +218,7 @@ class PointsLayer(SourceLayer):
             np.empty((0, 2)),
             features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
             metadata={MARKER: {"role": self.role}},
+            size=self._size,
             **styles.POINTS,
         )
 
