@@ -39,7 +39,7 @@ ELLIPSES: dict[str, Any] = {
 }
 # On a screen of 1366 x 768, in its pixels: the longest side of a frame that fits napari's canvas,
 # the edge of an ellipse and the width of a marker.
-CANVAS, EDGE, MARKER_WIDTH = 600.0, 1.5, 12.0
+CANVAS, EDGE, MARKER_WIDTH = 600.0, 1.5, 14.0
 # A click this near (half of it, in pixels of the frame) takes a star; crowded stars need less.
 WIDEST_MARKER = 18.0
 FRAME_COLOR = "#7a7f88"
