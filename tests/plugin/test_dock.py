@@ -99,7 +99,7 @@ def test_the_place_offered_is_the_centre_of_the_frame(scene, form):
     scene.observation = SMALL.replace(shape=(512, 512))
     assert (form.x.number, form.y.number) == (256, 256)
     enter(form.y, "10.5")
-    scene.observation = SMALL.replace(shape=(2048, 2048))
+    scene.observation = SMALL.replace(shape=(256, 256))
     assert (form.x.number, form.y.number) == (256, 10.5)
     form.pause()
 
@@ -315,6 +315,16 @@ def test_save_fits_appends_the_suffix(scene, qtbot, tmp_path, monkeypatch):
     (tmp_path / "field.v2.fits").write_text("mine")
     widget.save.native.click()
     assert (tmp_path / "field.v2.fits").read_text() == "mine"
+
+
+def test_what_was_typed_is_saved(scene, qtbot, tmp_path, monkeypatch):
+    """Catches a file with another exposure than the panel shows: typed, but without Enter."""
+    widget = SimulatorWidget(scene.viewer)
+    qtbot.addWidget(widget)
+    monkeypatch.setattr(widget, "ask_path", lambda: str(tmp_path / "x.fits"))
+    widget.instrument.exposure.native.setText("11")
+    widget.save.native.click()
+    assert Exposure.read(tmp_path / "x.fits").observation == SMALL.replace(exposure=11.0)
 
 
 @pytest.mark.needs_gl

@@ -62,6 +62,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
 
     def save_fits(self, event: Any = None) -> None:
         """Ask for a file and save the exposure in it; errors are shown."""
+        self.instrument.apply_typed()
         path = self.ask_path()
         if path is None:
             return

@@ -137,6 +137,11 @@ class InstrumentForm(Form):
             self.scene.seed = int(seed)
             self.show_observation()
 
+    def apply_typed(self) -> None:
+        """Take over what was typed and not confirmed yet, as before saving by a key."""
+        self._apply_exposure()
+        self._apply_seed()
+
     def _draw_noise(self, event: Any = None) -> None:
         self.scene.new_noise()
         self.show_observation()
