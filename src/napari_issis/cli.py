@@ -213,13 +213,14 @@ def _expose(
         print(f"{PROGRAM}: warning: {warning.message}", file=sys.stderr)
     observation = exposure.observation
     ny, nx = observation.shape
-    light = (exposure.expected.sum() - ny * nx * exposure.background) / observation.exposure
+    sky = ny * nx * exposure.background
+    light = max(exposure.expected.sum() - sky, 0.0) / observation.exposure
     print(
         f"{len(exposure.sources)} sources, {ny} x {nx} pixels, {observation.channel}, "
         f"{'-'.join(observation.filters)}, {observation.exposure:g} s, seed {exposure.seed}"
     )
     print(
-        f"sources {max(light, 0.0):.4g} cps in the frame, brightest pixel {exposure.counts.max()} counts, "
+        f"sources {light:.4g} cps in the frame, brightest pixel {exposure.counts.max()} counts, "
         f"sky {exposure.background:.3g} counts per pixel"
     )
     assumed = "assumed, none is published" if observation.psf_assumed else "as given"
