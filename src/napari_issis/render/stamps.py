@@ -82,8 +82,8 @@ class _Grid:
 
 
 @lru_cache(maxsize=256)
-def _grid(half: int, reach: int, limit: float) -> _Grid:
-    period = half + reach + 2
+def _grid(half: int, limit: float) -> _Grid:
+    period = 2 * half + 2
     count = int(np.ceil(limit * period))
     k = np.arange(count + 1) / period
     weight = np.where(k == 0, 1.0, 2.0) / period
@@ -91,9 +91,9 @@ def _grid(half: int, reach: int, limit: float) -> _Grid:
 
 
 @lru_cache(maxsize=8)
-def _point_spectrum(plan: Plan, half: int, reach: int, limit: float) -> Transfer:
+def _point_spectrum(plan: Plan, half: int, limit: float) -> Transfer:
     """High-passed transfer function on the quadrant (radial) or the full grid of a stamp."""
-    grid = _grid(half, reach, limit)
+    grid = _grid(half, limit)
     spectrum: Transfer
     if plan.optics.radial:
         spectrum = high_pass(plan, grid.k, grid.k) * grid.weight[:, None] * grid.weight
@@ -130,8 +130,8 @@ def _add_points(image: Array, plan: Plan, y: Array, x: Array, rate: Array, reach
     limit = _limit(plan)
     if not y.size or limit <= 0:
         return
-    grid = _grid(half, half, limit)
-    spectrum = _point_spectrum(plan, half, half, limit)
+    grid = _grid(half, limit)
+    spectrum = _point_spectrum(plan, half, limit)
     row, column = np.rint(y), np.rint(x)
     for first in range(0, y.size, CHUNK):
         part = slice(first, first + CHUNK)
@@ -176,7 +176,7 @@ def _add_extended(
         -half_y <= row < image.shape[0] + half_y and -half_x <= column < image.shape[1] + half_x
     ):
         return
-    grid_y, grid_x = _grid(half_y, half_y, limit), _grid(half_x, half_x, limit)
+    grid_y, grid_x = _grid(half_y, limit), _grid(half_x, limit)
     cos_y, sin_y = _turned(grid_y, one.y - row)
     cos_x, sin_x = _turned(grid_x, one.x - column)
     ky, kx = _both_signs(grid_y.k), grid_x.k
@@ -196,7 +196,7 @@ def _add_extended(
 
 @lru_cache(maxsize=256)
 def _quadrant_filter(plan: Plan, half_y: int, half_x: int, limit: float) -> Transfer:
-    grid_y, grid_x = _grid(half_y, half_y, limit), _grid(half_x, half_x, limit)
+    grid_y, grid_x = _grid(half_y, limit), _grid(half_x, limit)
     filtered: Transfer = (
         high_pass(plan, grid_y.k, grid_x.k) * grid_y.weight[:, None] * grid_x.weight
     )
