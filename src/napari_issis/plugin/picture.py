@@ -87,24 +87,24 @@ class PictureMaker:
         _, _, rate, clipped = self._kept
         return rate * observation.transmittance, clipped * observation.transmittance
 
-    def _keeps(self, sources: QTable, observation: Observation) -> bool:
+    def _keeps(self, sources: QTable, rendered: Observation) -> bool:
         return (
             self._kept is not None
-            and self._kept[1] == _rendered(observation)
+            and self._kept[1] == rendered
             and same_table(self._kept[0], sources)
         )
 
-    def _rest(self, drag: Drag, observation: Observation) -> Array:
+    def _rest(self, drag: Drag, rendered: Observation) -> Array:
         """Rate of the sources that do not move: the whole less the others, if it is known."""
         moving = np.isin(drag.source_id, list(drag.moving))
-        if self._keeps(drag.sources, observation):
-            whole, _ = self._rate(drag.sources, observation)
+        if self._keeps(drag.sources, rendered):
+            whole, _ = self._rate(drag.sources, rendered)
             if not moving.any():
                 return whole
             if 2 * moving.sum() <= moving.size:
-                part = count_rate(drag.sources[moving], observation, tolerance=PREVIEW_TOLERANCE)
+                part = count_rate(drag.sources[moving], rendered, tolerance=PREVIEW_TOLERANCE)
                 return np.maximum(whole - part, 0.0)
-        return noise_ready_rate(drag.sources[~moving], observation)[0]
+        return noise_ready_rate(drag.sources[~moving], rendered)[0]
 
 
 def _rendered(observation: Observation) -> Observation:

@@ -16,7 +16,7 @@ from .gaussians import decompose
 from .meshes import mesh_rate
 from .optics import Optics
 from .plan import BAND, make_plan
-from .profiles import sersic_transform
+from .profiles import disc_envelope, sersic_transform
 from .stamps import add_stamps
 
 Array = NDArray[np.float64]
@@ -151,8 +151,7 @@ def _ring_amplitude(optics: Optics, sources: SourceArrays, rate: Array) -> float
     q = 2 * np.pi * sources.r_half * ratio * psf.first_edge() * optics.pixel_scale
     sharp = np.ones_like(rate)
     disc = sources.kind == "uniform"
-    # the envelope of 2 J1(z) / z
-    sharp[disc] = np.minimum(1.0, 1.6 * np.maximum(np.sqrt(2) * q[disc], 1e-9) ** -1.5)
+    sharp[disc] = disc_envelope(q[disc])
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
         chosen = sources.index == n
         sharp[chosen] = sersic_transform(float(n), q[chosen])

@@ -79,8 +79,8 @@ def paint_large_discs(
     -----
     Away from its edge the widened ellipse is constant. Near the edge it is integrated along
     lines through each point, perpendicular to the edge or, if both edges are near, to the major
-    axis: exactly, as differences of the
-    normal distribution function, along each line, and by Gauss-Legendre across the lines.
+    axis: exactly along each line, as differences of the normal distribution function, and by
+    Gauss-Legendre across the lines.
     """
     reach = spread * np.sqrt(2 * (digits + 3))
     y = start[0] + cell * np.arange(mesh.shape[0])

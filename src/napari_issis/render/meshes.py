@@ -165,13 +165,12 @@ def _first_in_reach(
         ]
     )
     level = level.copy()
-    for _ in range(1100):  # doubling 2^-52 pixels that often passes the largest float
+    while True:
         reach = np.array([_reach(plan, j) for j in range(int(level.max(initial=0)) + 1)])
         beyond = away > reach[level]
         if not beyond.any():
-            break
+            return level
         level[beyond] += 1
-    return level
 
 
 def _reach(plan: Plan, level: int) -> float:
@@ -198,9 +197,8 @@ class _Mesh:
     ) -> None:
         self.plan, self.level, self.last = plan, level, last
         self.cell = plan.cell_size(level)
-        plain, spread, discs = content.plain, content.spread, content.discs
-        passed = content.passed
-        large = content.large
+        plain, spread, passed = content.plain, content.spread, content.passed
+        discs, large = content.discs, content.large
         count = len(plain) + len(spread) + len(discs) + len(large)
         self.empty = passed is None and count == 0
         if self.empty:
@@ -273,7 +271,6 @@ class _Mesh:
         """Transform of the contribution, and that of the density to pass on, if there is any."""
         spectrum: Spectrum | None = None
         onward: Spectrum | None = None
-        next_y, next_x = self._widening(2.0, 0.0)
         if self.low_mesh is not None:
             transformed = fft.rfft2(self.low_mesh, workers=-1)
             self.low_mesh = None  # the largest array of all
@@ -288,6 +285,7 @@ class _Mesh:
             filtered = transformed * self._filter(spread=False)
             spectrum = filtered if spectrum is None else spectrum + filtered
             if not self.last:
+                next_y, next_x = self._widening(2.0, 0.0)
                 transformed *= next_y[:, None]
                 transformed *= next_x
                 onward = transformed if onward is None else onward + transformed

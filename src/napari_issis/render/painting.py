@@ -40,8 +40,7 @@ def paint(
     xx, yy, xy = gaussians.xx + spread**2, gaussians.yy + spread**2, gaussians.xy
     y = (gaussians.y - start[0]) / cell
     x = (gaussians.x - start[1]) / cell
-    round_ = xy == 0
-    same = round_ & (gaussians.major == 0)
+    same = gaussians.major == 0
     if same.any():
         _paint_points(mesh, y[same], x[same], gaussians.rate[same], spread, cell, cut)
     for i in np.flatnonzero(~same):
@@ -64,18 +63,17 @@ def _paint_one(
     dy = (np.arange(rows.start, rows.stop) - y) * cell
     dx = (np.arange(columns.start, columns.stop) - x) * cell
     determinant = xx * yy - xy**2
-    column_part = np.exp(-0.5 * yy / determinant * dx**2)
-    row_part = np.exp(-0.5 * xx / determinant * dy**2)
-    row_part *= rate / (2 * np.pi * np.sqrt(determinant))
+    height = rate / (2 * np.pi * np.sqrt(determinant))
     if xy == 0:
-        mesh[rows, columns] += row_part[:, None] * column_part
+        row_part = height * np.exp(-0.5 * xx / determinant * dy**2)
+        mesh[rows, columns] += row_part[:, None] * np.exp(-0.5 * yy / determinant * dx**2)
         return
     # of the three factors the mixed one alone could overflow: exponents are added first
     exponent = (xy / determinant * dy)[:, None] * dx
     exponent -= (0.5 * xx / determinant * dy**2)[:, None]
     exponent -= 0.5 * yy / determinant * dx**2
     patch = np.exp(exponent, out=exponent)
-    patch *= rate / (2 * np.pi * np.sqrt(determinant))
+    patch *= height
     mesh[rows, columns] += patch
 
 

@@ -32,7 +32,7 @@ BAND = 0.35
 # reach over thousands of pixels.
 FAINTEST_RINGS = 1e-10
 # points of a mesh (0.4 GB) above which stamps are preferred
-LARGEST_MESH = 5e7
+COMFORTABLE_MESH = 5e7
 
 
 @dataclass(frozen=True)
@@ -152,16 +152,17 @@ def make_plan(
     # a third of the error allowed, in quarter steps so that plans are shared
     digits = float(np.ceil(4 * np.log(3 / max(accuracy, 1e-15))) / 4)
     ring_digits = float(np.ceil(2 * np.log(10 / max(ring_accuracy, FAINTEST_RINGS))) / 2)
+    ring_digits = max(ring_digits, 0.0)
     highest = max(optics.band_limit(0.1 * np.exp(-digits)), 1e-6)
     if sharp_edge:
         # leave room between the meshes' band and the edge
         cell = 2.0 ** np.ceil(np.log2(BAND / (0.7 * highest)))
         return Plan(optics, digits, 0.0, max(cell, 0.5), stamps=True)
     finest = 2.0 ** np.floor(np.log2(BAND / highest))
-    meshes = Plan(optics, digits, max(ring_digits, 0.0), finest, stamps=False)
+    meshes = Plan(optics, digits, ring_digits, finest, stamps=False)
     if finest >= 0.5 or meshes_only:
         return meshes
-    stamps = Plan(optics, digits, max(ring_digits, 0.0), 0.5, stamps=True)
+    stamps = Plan(optics, digits, ring_digits, 0.5, stamps=True)
     if _seconds(meshes, shape, points, extended) < _seconds(stamps, shape, points, extended):
         return meshes
     return stamps
@@ -172,8 +173,8 @@ def _seconds(plan: Plan, shape: tuple[int, int], points: int, extended: int) -> 
     reach = plan.reach(0)
     mesh = float(np.prod([(n + reach) / plan.cell for n in shape]))
     seconds = 3e-8 * mesh + 1e-8 * points * (2 * plan.cut() * plan.spread()) ** 2
-    if mesh > LARGEST_MESH:
-        seconds *= mesh / LARGEST_MESH
+    if mesh > COMFORTABLE_MESH:
+        seconds *= mesh / COMFORTABLE_MESH
     if plan.stamps:
         pixels = 2 * plan.reach(-1) + 1
         modes = pixels * plan.optics.band_limit(0.1 * np.exp(-plan.digits))

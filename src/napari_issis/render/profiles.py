@@ -169,6 +169,12 @@ def _log_transform(n: float) -> CubicSpline:
     return CubicSpline(log_q, np.log(np.maximum(value, 1e-300)))
 
 
+def disc_envelope(q: Array) -> Array:
+    """Bound of the modulus of `disc_transform`: sqrt(8 / pi) z^(-3/2), at most 1."""
+    bound: Array = np.minimum(1.0, 1.6 * np.maximum(np.sqrt(2) * q, 1e-9) ** -1.5)
+    return bound
+
+
 def disc_transform(q: Array) -> Array:
     """2 J1(z) / z, z = sqrt(2) q: transform of the uniform disc of half-light radius 1."""
     z = np.sqrt(2) * q

@@ -17,7 +17,7 @@ from ..sources import SourceArrays
 from .discs import disc_half_sizes, elliptical_frequency
 from .optics import Transfer
 from .plan import Plan
-from .profiles import disc_transform, sersic_gaussians, sersic_transform
+from .profiles import disc_envelope, disc_transform, sersic_gaussians, sersic_transform
 
 Array = NDArray[np.float64]
 CHUNK = 32
@@ -45,14 +45,13 @@ def add_stamps(
     reach = plan.reach(-1)
     plan = plan.without_rings()
     is_point = sources.kind == "point"
-    near = _within(sources, np.full(len(sources), reach), image.shape) & (rate != 0)
-    points = is_point & near
+    points = is_point & _within(sources, reach, image.shape)
     _add_points(image, plan, sources.y[points], sources.x[points], rate[points], reach)
-    for i in np.flatnonzero(~is_point & (rate != 0)):
+    for i in np.flatnonzero(~is_point):
         _add_extended(image, plan, sources.take(slice(i, i + 1)), float(rate[i]), reach, allowed)
 
 
-def _within(sources: SourceArrays, half: Array, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _within(sources: SourceArrays, half: float, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     near: NDArray[np.bool_] = (
         (sources.y > -half - 1)
         & (sources.y < shape[0] + half)
@@ -117,9 +116,9 @@ def _limit(plan: Plan) -> float:
     return plan.optics.band_limit(0.1 * np.exp(-plan.digits))
 
 
-def _turned(grid: _Grid, shift: Array) -> tuple[Array, Array]:
+def _turned(grid: _Grid, tables: tuple[Array, Array], shift: Array) -> tuple[Array, Array]:
     """Cosine and sine of 2 pi k (m - shift) for each shift, shape (n, 2 half + 1, len(k))."""
-    cos_m, sin_m = grid.tables()
+    cos_m, sin_m = tables
     angle = 2 * np.pi * np.outer(shift, grid.k)
     cos_s, sin_s = np.cos(angle)[:, None, :], np.sin(angle)[:, None, :]
     return cos_m * cos_s + sin_m * sin_s, sin_m * cos_s - cos_m * sin_s
@@ -131,12 +130,13 @@ def _add_points(image: Array, plan: Plan, y: Array, x: Array, rate: Array, reach
     if not y.size or limit <= 0:
         return
     grid = _grid(half, limit)
+    tables = grid.tables()
     spectrum = _point_spectrum(plan, half, limit)
     row, column = np.rint(y), np.rint(x)
     for first in range(0, y.size, CHUNK):
         part = slice(first, first + CHUNK)
-        cos_y, sin_y = _turned(grid, y[part] - row[part])
-        cos_x, sin_x = _turned(grid, x[part] - column[part])
+        cos_y, sin_y = _turned(grid, tables, y[part] - row[part])
+        cos_x, sin_x = _turned(grid, tables, x[part] - column[part])
         cos_y *= rate[part, None, None]
         sin_y *= rate[part, None, None]
         stamps = _images(spectrum, None, cos_y, sin_y, cos_x, sin_x)
@@ -177,8 +177,8 @@ def _add_extended(
     ):
         return
     grid_y, grid_x = _grid(half_y, limit), _grid(half_x, limit)
-    cos_y, sin_y = _turned(grid_y, one.y - row)
-    cos_x, sin_x = _turned(grid_x, one.x - column)
+    cos_y, sin_y = _turned(grid_y, grid_y.tables(), one.y - row)
+    cos_x, sin_x = _turned(grid_x, grid_x.tables(), one.x - column)
     ky, kx = _both_signs(grid_y.k), grid_x.k
     profile = transform(one, ky, kx) * rate
     if plan.optics.radial:
@@ -218,8 +218,7 @@ def _needed_limit(plan: Plan, one: SourceArrays, rate: float, allowed: float) ->
     limit = _limit(plan)
     if limit <= 0:
         return 0.0
-    count = 160
-    k = (np.arange(count) + 0.5) * (limit / count)
+    k, high = _radial_high_pass(plan, limit)
     angle = (np.arange(24) + 0.5) * (np.pi / 24)
     ky, kx = np.outer(k, np.sin(angle)), np.outer(k, np.cos(angle))
     pa = np.radians(one.pa[0])
@@ -227,25 +226,25 @@ def _needed_limit(plan: Plan, one: SourceArrays, rate: float, allowed: float) ->
     across = (1 - one.ellipticity[0]) * (ky * np.sin(pa) + kx * np.cos(pa))
     q = 2 * np.pi * one.r_half[0] * np.hypot(along, across)
     if one.kind[0] == "uniform":
-        # the envelope of 2 J1(z) / z
-        z = np.sqrt(2) * q
-        profile = np.minimum(1.0, 2 * np.sqrt(2 / np.pi) * z**-1.5)
+        profile = disc_envelope(q)
     else:
         profile = sersic_transform(float(one.index[0]), q)
-    amplitude = profile.mean(axis=1) * _radial_high_pass(plan, limit, count)
-    tail = np.cumsum((2 * np.pi * k * amplitude)[::-1])[::-1] * (limit / count) * abs(rate)
+    step = limit / k.size
+    amplitude = profile.mean(axis=1) * high
+    tail = np.cumsum((2 * np.pi * k * amplitude)[::-1])[::-1] * step * abs(rate)
     needed = np.flatnonzero(tail > allowed)
-    return float(k[needed[-1]] + limit / count) if needed.size else 0.0
+    return float(k[needed[-1]] + step) if needed.size else 0.0
 
 
 @lru_cache(maxsize=16)
-def _radial_high_pass(plan: Plan, limit: float, count: int) -> Array:
-    k = (np.arange(count, dtype=np.float64) + 0.5) * (limit / count)
+def _radial_high_pass(plan: Plan, limit: float) -> tuple[Array, Array]:
+    """Return frequencies up to a limit, and the larger high-passed transfer on either axis."""
+    k = (np.arange(160, dtype=np.float64) + 0.5) * (limit / 160)
     zero: Array = np.zeros(1)
     transfer = np.maximum(
         np.abs(plan.optics.transfer(zero, k)[0]), np.abs(plan.optics.transfer(k, zero)[:, 0])
     )
-    return np.asarray(transfer * (1 - plan.lowpass(k, 0)))
+    return k, transfer * (1 - plan.lowpass(k, 0))
 
 
 def _half_sizes(
@@ -257,9 +256,8 @@ def _half_sizes(
         return int(np.ceil(half_y[0] + reach)), int(np.ceil(half_x[0] + reach))
     gaussians = sersic_gaussians(float(one.index[0]), plan.digits + 3)
     limit = _limit(plan)
-    count = 160
-    k = (np.arange(count) + 0.5) * (limit / count)
-    amplitude = 2 * np.pi * k * _radial_high_pass(plan, limit, count) * (limit / count)
+    k, high = _radial_high_pass(plan, limit)
+    amplitude = 2 * np.pi * k * high * (limit / k.size)
     major = one.r_half[0] * gaussians.sigma
     minor = major * (1 - one.ellipticity[0])
     level = np.exp(-2 * (np.pi * minor[:, None] * k) ** 2) @ amplitude
