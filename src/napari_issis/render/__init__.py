@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from astropy.table import Table
 from numpy.typing import NDArray
@@ -12,7 +10,7 @@ from ..observation import Observation
 from ..psf import RadialPSF
 from ..sources import SourceArrays, check_sources
 from .direct import add_direct, has_sharp_edge
-from .gaussians import decompose
+from .gaussians import NODES, decompose
 from .meshes import mesh_rate
 from .optics import Optics
 from .plan import BAND, make_plan
@@ -112,7 +110,7 @@ def _render(
     """Render with an error of at most ``allowed`` cps per pixel."""
     is_point, is_disc = sources.kind == "point", sources.kind == "uniform"
     sharp_edge = has_sharp_edge(
-        optics, 0.1 * allowed / brightest, optics.extent + 50.0, point_area(optics)
+        optics, 0.1 * allowed / brightest, optics.extent + 50.0, optics.point_area
     )
     plan = make_plan(
         optics,
@@ -125,19 +123,20 @@ def _render(
         meshes_only=bool(np.any(sources.r_half[is_disc] > LARGEST_STAMP)),
     )
     share = 0.03 * allowed
-    limit = min(BAND / plan.cell_size(0), optics.band_limit(0.01 * np.exp(-plan.digits)))
     gaussians = decompose(
         sources.take(~is_disc),
         rate[~is_disc],
-        plan.digits + 1.0,
-        limit,
+        plan.digits
+        + 1.0
+        + np.log(np.minimum(peaks(optics, sources, rate)[~is_disc] / brightest, 1.0)),
+        optics.moment(4 * NODES, np.inf if plan.near == "mesh" else BAND / plan.cell),
         share / np.sqrt(len(sources)),
-        plan.cell,
+        plan.near_cell if plan.near == "mesh" else plan.cell,
     )
-    image = mesh_rate(plan, shape, gaussians, sources.take(is_disc), rate[is_disc], share)
+    image = mesh_rate(plan, shape, gaussians, sources.take(is_disc), rate[is_disc], allowed)
     if sharp_edge:
         add_direct(image, plan, sources, rate)
-    elif plan.stamps:
+    elif plan.near == "stamps":
         add_stamps(image, plan, sources, rate, share / np.sqrt(len(sources)))
     return image
 
@@ -155,19 +154,11 @@ def _ring_amplitude(optics: Optics, sources: SourceArrays, rate: Array) -> float
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
         chosen = sources.index == n
         sharp[chosen] = sersic_transform(float(n), q[chosen])
-    return float((rate * sharp).max()) / point_area(optics)
+    return float((rate * sharp).max()) / optics.point_area
 
 
 def peaks(optics: Optics, sources: SourceArrays, rate: Array) -> Array:
     """Estimate the highest pixel of each source alone, cps per pixel, shape (n,)."""
     size = np.pi * sources.r_half**2 * (1 - sources.ellipticity)
     # half of the light inside the half-light ellipse; cusps are higher, which is safe
-    return rate / (point_area(optics) + 2 * size)
-
-
-@lru_cache(maxsize=64)
-def point_area(optics: Optics) -> float:
-    """Flux over highest pixel of a point source, pixels."""
-    k = (np.arange(2048) + 0.5) / 2048 * max(optics.band_limit(1e-4), 1e-9)
-    transfer = np.abs(np.asarray(optics.transfer(np.zeros(1), k)[0]))
-    return 1 / (2 * np.pi * float(np.sum(k * transfer) * (k[1] - k[0])))
+    return rate / (optics.point_area + 2 * size)

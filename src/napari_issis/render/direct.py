@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from ..image_psf import ImagePSF
 from ..sources import SourceArrays
+from .near import high_pass
 from .optics import Optics
 from .plan import Plan
-from .stamps import high_pass, transform
+from .stamps import transform
 
 Array = NDArray[np.float64]
 

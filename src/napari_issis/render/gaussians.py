@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh_tridiagonal
 
 from ..sources import SourceArrays
-from .profiles import sersic_gaussians
+from .profiles import GaussianSum, sersic_gaussians
 
 Array = NDArray[np.float64]
 
 # Gaussians more elongated than this are cut along their major axis before they are painted
 MOST_ELONGATED = 6.0
+# Gaussians that take the place of a source's narrowest
+NODES = 3
+FEWEST_DIGITS = 4.0
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,12 @@ def points(x: Array, y: Array, rate: Array) -> Gaussians:
 
 
 def decompose(
-    sources: SourceArrays, rate: Array, digits: float, merge: float, allowed: float, cell: float
+    sources: SourceArrays,
+    rate: Array,
+    digits: Array,
+    moment: float,
+    allowed: float,
+    cell: float,
 ) -> Gaussians:
     """Points and Sersic profiles of a scene as Gaussians; uniform ellipses are left out.
 
@@ -83,10 +94,11 @@ def decompose(
         The scene.
     rate : ndarray, shape (n,)
         Count rates of the sources.
-    digits : float
-        Natural logarithm of the accuracy of the profiles.
-    merge : float
-        Highest frequency, cycles per pixel, at which the Gaussians will be looked at.
+    digits : ndarray, shape (n,)
+        Natural logarithms of the accuracies of the profiles.
+    moment : float
+        `Optics.moment` of order 4 NODES over the frequencies at which the Gaussians will be
+        looked at.
     allowed : float
         Error in cps per pixel up to which narrow Gaussians of a source may be joined.
     cell : float
@@ -94,47 +106,73 @@ def decompose(
     """
     is_point = sources.kind == "point"
     parts = [points(sources.x[is_point], sources.y[is_point], rate[is_point])]
-    for n in np.unique(sources.index[np.isfinite(sources.index)]):
-        chosen = sources.index == n
-        gaussians = sersic_gaussians(float(n), digits)
-        order = np.argsort(gaussians.sigma)
-        sigma, fraction = gaussians.sigma[order], gaussians.fraction[order]
-        r_half, share = sources.r_half[chosen], rate[chosen]
-        joined, first = _join_narrow(sigma, fraction, r_half, share, merge, allowed)
-        keep = np.arange(sigma.size) >= first[:, None]
-        row, column = np.nonzero(keep)
-        width = np.concatenate([joined[1], r_half[row] * sigma[column]])
-        flux = np.concatenate([joined[0], share[row] * fraction[column]])
-        row = np.concatenate([np.arange(r_half.size), row])
-        x, y, ratio, pa = (
-            values[chosen][row]
-            for values in (sources.x, sources.y, 1 - sources.ellipticity, np.radians(sources.pa))
-        )
-        parts.append(ellipse(x, y, flux, width, width * ratio, pa))
+    # sums of Gaussians are kept: few different accuracies
+    digits = 2 * np.ceil(0.5 * np.maximum(digits, FEWEST_DIGITS))
+    smooth = np.isfinite(sources.index)
+    for n, accuracy in sorted(set(zip(sources.index[smooth], digits[smooth], strict=True))):
+        chosen = np.flatnonzero((sources.index == n) & (digits == accuracy))
+        profile = (float(n), float(accuracy))
+        joined = _joinable(sersic_gaussians(*profile), sources.r_half[chosen], moment)
+        joined = np.sum(np.abs(rate[chosen, None]) * joined <= allowed, axis=1)
+        for count in np.unique(joined):
+            alike = chosen[joined == count]
+            sigma, fraction = _joined(profile, int(count))
+            width = (sources.r_half[alike, None] * sigma).ravel()
+            row = np.repeat(alike, sigma.size)
+            parts.append(
+                ellipse(
+                    sources.x[row],
+                    sources.y[row],
+                    (rate[alike, None] * fraction).ravel(),
+                    width,
+                    width * (1 - sources.ellipticity[row]),
+                    np.radians(sources.pa[row]),
+                )
+            )
     everything = join(parts)
-    return _shorten(everything.take(everything.rate != 0), digits, 4 * cell)
+    longest = float(digits.max(initial=FEWEST_DIGITS))
+    return _shorten(everything.take(everything.rate != 0), longest, 4 * cell)
 
 
-def _join_narrow(
-    sigma: Array, fraction: Array, r_half: Array, rate: Array, merge: float, allowed: float
-) -> tuple[tuple[Array, Array], NDArray[np.intp]]:
-    """Join each source's narrowest Gaussians into one of the same flux and variance.
+def _joinable(gaussians: GaussianSum, r_half: Array, moment: float) -> Array:
+    """Bound of the error, per rate, that `_joined` makes of the narrowest 1, 2, ... Gaussians.
 
-    Their transforms differ by about flux (2 pi^2 k^2 sigma^2)^2 / 8 at frequency k.
+    An n-point Gauss rule for exp(-x s), 0 < s < s_max, is wrong by 2 (x s_max / 4)^(2n) / (2n)!
+    at most, times the weight; x s = 2 pi^2 k^2 sigma^2 here.
     """
-    flux = np.cumsum(fraction)
-    mean_square = np.cumsum(fraction * sigma**2) / flux
-    exponent = 2 * (np.pi * merge * r_half[:, None] * sigma) ** 2
-    error = np.abs(rate[:, None] * flux) * exponent**2 / 8 * np.pi * merge**2
-    first = np.sum(np.logical_and.accumulate(error <= allowed, axis=1), axis=1)
-    last = np.maximum(first - 1, 0)
-    some = first > 0
+    n = NODES
+    flux = np.cumsum(np.abs(gaussians.fraction))
+    largest = np.maximum.accumulate(
+        flux * (0.5 * np.pi**2 * (r_half[:, None] * gaussians.sigma) ** 2) ** (2 * n), axis=1
+    )
+    bound: Array = largest * (2 * moment / factorial(2 * n))
+    return bound
+
+
+@lru_cache(maxsize=512)
+def _joined(profile: tuple[float, float], count: int) -> tuple[Array, Array]:
+    """Widths and fractions of a profile with the ``count`` narrowest Gaussians in NODES ones.
+
+    The nodes and weights are those of the Gauss rule for the discrete measure of the squared
+    widths (Gautschi 2004, Orthogonal Polynomials, 2.2.3: Stieltjes' procedure).
+    """
+    gaussians = sersic_gaussians(*profile)
+    sigma, fraction = gaussians.sigma, gaussians.fraction
+    if count <= NODES or np.any(fraction[:count] < 0):
+        return sigma, fraction
+    s, weight = sigma[:count] ** 2 / sigma[count - 1] ** 2, fraction[:count]
+    diagonal, beside = np.zeros(NODES), np.zeros(NODES)
+    before, now = np.zeros(count), np.full(count, 1 / np.sqrt(weight.sum()))
+    for i in range(NODES):
+        diagonal[i] = np.sum(weight * s * now**2)
+        after = (s - diagonal[i]) * now - beside[i - 1] * before
+        norm = np.sqrt(np.sum(weight * after**2))
+        beside[i] = norm
+        before, now = now, after / norm
+    nodes, vectors = eigh_tridiagonal(diagonal, beside[:-1])
     return (
-        (
-            np.where(some, rate * flux[last], 0.0),
-            np.where(some, r_half * np.sqrt(np.abs(mean_square[last])), 0.0),
-        ),
-        first,
+        np.concatenate([sigma[count - 1] * np.sqrt(np.maximum(nodes, 0.0)), sigma[count:]]),
+        np.concatenate([weight.sum() * vectors[0] ** 2, fraction[count:]]),
     )
 
 

@@ -1,4 +1,4 @@
-"""The frequencies that meshes carry: paint, transform, filter, pass on, add up."""
+"""The frequencies that coarse meshes carry: paint, transform, filter, pass on, add up."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from ..sources import SourceArrays
 from .discs import disc_half_sizes, paint_discs, paint_large_discs
 from .gaussians import Gaussians
 from .interpolation import Span, add_up, spans
+from .near import near_rate
 from .optics import Transfer
-from .painting import paint
-from .plan import Plan
+from .painting import half_patches, paint
+from .plan import BAND, Plan, spread_cut
 
-# Uniform ellipses wider than this, in cells of the finest mesh, are painted on every mesh as far
-# as they lie on it, instead of once and whole.
-LARGEST_DISC = 1500
-# points of a mesh, some 4 GB of memory in all
-LARGEST_MESH = 1.3e8
+# Uniform ellipses wider than this, in pixels, are painted on every mesh as far as they lie on it,
+# instead of once and whole.
+LARGEST_DISC = 400.0
+# share of the error allowed that each Gaussian may take where it is cut or sampled
+SHARE = 0.02
+FEWEST_DIGITS = 3.0
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
@@ -56,7 +58,9 @@ class _Content:
     """What a mesh is painted with."""
 
     plain: Gaussians
+    plain_digits: Array
     spread: Gaussians
+    spread_digits: Array
     discs: SourceArrays
     disc_rate: Array
     large: SourceArrays
@@ -72,7 +76,7 @@ def mesh_rate(
     disc_rate: Array,
     allowed: float,
 ) -> Array:
-    """Count rate, up to the frequencies that the meshes carry.
+    """Count rate, up to the frequencies that stamps do not carry.
 
     Parameters
     ----------
@@ -87,7 +91,7 @@ def mesh_rate(
     disc_rate : ndarray
         Their count rates.
     allowed : float
-        Error in cps per pixel up to which the light of distant periodic images may be left in.
+        Error allowed, cps per pixel.
 
     Returns
     -------
@@ -95,16 +99,21 @@ def mesh_rate(
     """
     if not len(gaussians) and not len(discs):
         return np.zeros(shape)
-    is_large = discs.r_half > LARGEST_DISC * plan.cell_size(0)
+    is_large = discs.r_half > LARGEST_DISC
     large, large_rate = discs.take(is_large), disc_rate[is_large]
     discs, disc_rate = discs.take(~is_large), disc_rate[~is_large]
-    level_of, plain = _levels(plan, shape, gaussians)
+    digits = _digits(plan, gaussians, allowed)
+    own = _own_levels(plan, gaussians, digits)
+    half = (plan.cut() * np.sqrt(gaussians.yy), plan.cut() * np.sqrt(gaussians.xx))
+    near = (own < 0) & (_outside(shape, gaussians.y, gaussians.x, half) <= plan.reach(-1))
+    level_of = _first_in_reach(plan, shape, gaussians.y, gaussians.x, half, np.maximum(own, 0))
+    plain = level_of == own
     disc_level = _first_in_reach(
         plan, shape, discs.y, discs.x, disc_half_sizes(discs), np.zeros(len(discs), dtype=np.intp)
     )
     total = float(sum(np.abs(r).sum() for r in (gaussians.rate, disc_rate, large_rate)))
     top = max(int(level_of.max(initial=0)), int(disc_level.max(initial=0)))
-    while _wings(plan, top, shape, total) > allowed:
+    while _wings(plan, top, shape, total) > 0.03 * allowed:
         top += 1
     results: list[Array | None] = []
     passed: Density | None = None
@@ -117,7 +126,9 @@ def mesh_rate(
             frame,
             _Content(
                 plain=gaussians.take(mine & plain),
+                plain_digits=digits[mine & plain],
                 spread=gaussians.take(mine & ~plain),
+                spread_digits=digits[mine & ~plain],
                 discs=discs.take(my_discs),
                 disc_rate=disc_rate[my_discs],
                 large=large,
@@ -129,21 +140,42 @@ def mesh_rate(
             results.append(None)
             continue
         here, onward = mesh.transform()
-        results.append(mesh.rate(here, shape))
+        results.append(mesh.rate(here))
         passed = None if onward is None else mesh.pass_on(onward)
-    return add_up(plan, results, shape)
+    image = add_up(plan, results, shape)
+    if plan.near == "mesh":
+        close = _outside(shape, discs.y, discs.x, disc_half_sizes(discs)) <= plan.reach(-1)
+        sharp = (gaussians.take(near), digits[near], discs.take(close), disc_rate[close])
+        if near.any() or close.any() or len(large):
+            image += near_rate(plan, shape, *sharp, large, large_rate)
+    return image
 
 
-def _levels(
-    plan: Plan, shape: tuple[int, int], gaussians: Gaussians
-) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Coarsest level that holds each Gaussian, and whether it needs no spreading there."""
+def _digits(plan: Plan, gaussians: Gaussians, allowed: float) -> Array:
+    """Natural logarithm of the accuracy that each Gaussian needs: faint ones need less."""
+    height = np.abs(gaussians.rate) / (
+        plan.optics.point_area + 2 * np.pi * gaussians.minor * gaussians.major
+    )
     with np.errstate(divide="ignore"):
-        own = np.floor(np.log2(gaussians.minor / (plan.plain() * plan.cell_size(0))))
-    own = np.maximum(own, 0).astype(np.intp)
-    half = (plan.cut() * np.sqrt(gaussians.yy), plan.cut() * np.sqrt(gaussians.xx))
-    level = _first_in_reach(plan, shape, gaussians.y, gaussians.x, half, own)
-    return level, (level == own) & (own > 0)
+        digits: Array = np.log(height / (SHARE * allowed))
+    return np.clip(digits, FEWEST_DIGITS, plan.digits)
+
+
+def _own_levels(plan: Plan, gaussians: Gaussians, digits: Array) -> NDArray[np.intp]:
+    """Coarsest level whose mesh holds each Gaussian's spectrum; -1 if there is none.
+
+    On a mesh of whole pixels the spectrum may go up to the Nyquist frequency, on coarser ones as
+    far as they are interpolated.
+    """
+    width = gaussians.minor * np.pi / np.sqrt(digits / 2) / plan.cell
+    level = np.full(width.shape, -1, dtype=np.intp)
+    if plan.near and plan.cell == 1:
+        level[width >= 2.0] = 0
+    with np.errstate(divide="ignore"):
+        coarse = np.floor(np.log2(width * BAND))
+    level = np.maximum(level, np.maximum(coarse, -1).astype(np.intp))
+    level[level == 0] = 0 if plan.near else -1
+    return level
 
 
 def _first_in_reach(
@@ -155,7 +187,19 @@ def _first_in_reach(
     level: NDArray[np.intp],
 ) -> NDArray[np.intp]:
     """Raise levels until what lies at (y, x) is felt in the frame."""
-    away = np.maximum.reduce(
+    away = _outside(shape, y, x, half)
+    level = level.copy()
+    while True:
+        reach = np.array([_reach(plan, j) for j in range(int(level.max(initial=0)) + 1)])
+        beyond = away > reach[level]
+        if not beyond.any():
+            return level
+        level[beyond] += 1
+
+
+def _outside(shape: tuple[int, int], y: Array, x: Array, half: tuple[Array, Array]) -> Array:
+    """Distance in pixels along the axes of what has half-sizes ``half`` from the frame."""
+    away: Array = np.maximum.reduce(
         [
             -(y + half[0]),
             y - half[0] - (shape[0] - 1),
@@ -164,13 +208,7 @@ def _first_in_reach(
             np.zeros_like(y),
         ]
     )
-    level = level.copy()
-    while True:
-        reach = np.array([_reach(plan, j) for j in range(int(level.max(initial=0)) + 1)])
-        beyond = away > reach[level]
-        if not beyond.any():
-            return level
-        level[beyond] += 1
+    return away
 
 
 def _reach(plan: Plan, level: int) -> float:
@@ -204,22 +242,29 @@ class _Mesh:
         if self.empty:
             return
         sigma, cut = plan.spread() * self.cell, plan.cut()
+        cut_plain, cut_spread = np.sqrt(2 * content.plain_digits), spread_cut(content.spread_digits)
         disc_half = disc_half_sizes(discs)
         axes = []
         for axis in (0, 1):
             low, high = frame[axis][0] * self.cell, frame[axis][1] * self.cell
             reach = plan.reach(level)
             # the same for all scenes that lie in the frame, so that filters can be kept
-            edge = cut * sigma + 2 * self.cell + (reach if len(large) else 0.0)
+            edge = self.cell * (half_patches(np.array(sigma**2), self.cell, cut) + 1.0)
+            edge += reach if len(large) else 0.0
             extent = [low - edge, high + edge]
             for centre, half in (
                 (
                     (plain.y, plain.x)[axis],
-                    cut * np.sqrt((plain.yy, plain.xx)[axis]) + 2 * self.cell,
+                    self.cell
+                    * (half_patches((plain.yy, plain.xx)[axis], self.cell, cut_plain) + 1),
                 ),
                 (
                     (spread.y, spread.x)[axis],
-                    cut * np.sqrt((spread.yy, spread.xx)[axis] + sigma**2) + 2 * self.cell,
+                    self.cell
+                    * (
+                        half_patches((spread.yy, spread.xx)[axis] + sigma**2, self.cell, cut_spread)
+                        + 1
+                    ),
                 ),
                 ((discs.y, discs.x)[axis], disc_half[axis] * 1.1 + cut * sigma + 12 * self.cell),
             ):
@@ -241,12 +286,6 @@ class _Mesh:
         self.axes = (axes[0], axes[1])
         self.shape = (axes[0].count, axes[1].count)
         start = (axes[0].start, axes[1].start)
-        if self.shape[0] * self.shape[1] > LARGEST_MESH:
-            raise ValueError(
-                f"this accuracy needs a mesh of {self.shape[0]} x {self.shape[1]} points, because "
-                "the PSF's diffraction rings reach far; choose a larger tolerance, a smaller "
-                "frame or a PSF averaged over a band."
-            )
         self.plain_mesh: Array | None = None
         self.low_mesh: Array | None = None
         self.large_mesh: Array | None = None
@@ -257,10 +296,10 @@ class _Mesh:
             )
         if len(plain):
             self.plain_mesh = np.zeros(self.shape)
-            paint(self.plain_mesh, start, self.cell, plain, 0.0, cut)
+            paint(self.plain_mesh, start, self.cell, plain, 0.0, cut_plain)
         if len(spread) or len(discs) or passed is not None:
             self.low_mesh = np.zeros(self.shape)
-            paint(self.low_mesh, start, self.cell, spread, sigma, cut)
+            paint(self.low_mesh, start, self.cell, spread, sigma, cut_spread)
             paint_discs(self.low_mesh, start, self.cell, discs, content.disc_rate, sigma, cut)
             if passed is not None:
                 y, x = (round((passed.intervals[a][0] - start[a]) / self.cell) for a in (0, 1))
@@ -304,17 +343,13 @@ class _Mesh:
         ky, kx = fft.fftfreq(self.shape[0], self.cell), fft.rfftfreq(self.shape[1], self.cell)
         return np.exp(-2 * np.pi**2 * sigma2 * ky**2), np.exp(-2 * np.pi**2 * sigma2 * kx**2)
 
-    def rate(self, spectrum: Spectrum, shape: tuple[int, int]) -> Array:
-        """Contribution at the mesh points of the frame, or at its pixels below one pixel."""
-        ny, nx = self.shape
-        cell = self.cell
-        while cell < 1:
-            spectrum, ny, nx, cell = fold(spectrum, ny, nx), ny // 2, nx // 2, 2 * cell
-        values = fft.irfft2(spectrum, (ny, nx), workers=-1)
+    def rate(self, spectrum: Spectrum) -> Array:
+        """Contribution at the mesh points of the frame."""
+        values = fft.irfft2(spectrum, self.shape, workers=-1)
         index = []
-        for axis, count, n in zip(self.axes, (ny, nx), shape, strict=True):
-            first, last = (0, n - 1) if self.cell < 1 else axis.frame
-            index.append((np.arange(first, last + 1) - round(axis.start / cell)) % count)
+        for axis, count in zip(self.axes, self.shape, strict=True):
+            begin = round(axis.start / self.cell)
+            index.append((np.arange(axis.frame[0], axis.frame[1] + 1) - begin) % count)
         wanted: Array = values[np.ix_(*index)]
         return wanted
 
@@ -335,16 +370,14 @@ class _Mesh:
 
 def _axis(content: Interval, frame: Span, reach: float, cell: float, room: float) -> Axis:
     """Lay out an axis so that neither the kernel nor what is passed on wraps into the frame."""
-    # on a point of the next mesh, and on a pixel
-    step = max(2 * cell, 1.0)
+    step = 2 * cell  # on a point of the next mesh
     start = step * np.floor((content[0] - room) / step)
     need = max(
         content[1] + room - start,
         frame[1] * cell + reach - content[0],
         content[1] + reach - frame[0] * cell,
     )
-    unit = max(2, round(2 / cell)) if cell < 1 else 2
-    count = unit * fft.next_fast_len(int(np.ceil((need / cell + 1) / unit)), real=True)
+    count = 2 * fft.next_fast_len(int(np.ceil((need / cell + 1) / 2)), real=True)
     return Axis(float(start), int(count), content, frame)
 
 
@@ -360,7 +393,10 @@ def _filter(plan: Plan, level: int, last: bool, shape: tuple[int, int], spread: 
         rows = np.minimum(rows, shape[0] - rows)
         ky = np.abs(ky[: shape[0] // 2 + 1])
     k = np.hypot(ky[:, None], kx)
-    passed = plan.lowpass(k, level if spread else 0)
+    if spread or plan.near == "stamps":
+        passed = plan.lowpass(k, level if spread else 0)
+    else:
+        passed = np.ones_like(k)
     if not last:
         passed = passed - plan.lowpass(k, level + 1)
     passed[k > limit] = 0.0

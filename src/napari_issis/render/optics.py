@@ -39,6 +39,23 @@ class Optics:
         """Half-size in pixels beyond which an image PSF is zero."""
         return self.psf.extent / self.pixel_scale
 
+    @property
+    def point_area(self) -> float:
+        """Flux over highest pixel of a point source, pixels."""
+        return 1 / self.moment(0)
+
+    def moment(self, power: int, limit: float = np.inf) -> float:
+        """Integral of k^power times the modulus of the transfer function along kx, over k < limit.
+
+        Parameters
+        ----------
+        power : int
+            Power of the frequency in cycles per pixel.
+        limit : float
+            Cycles per pixel.
+        """
+        return _moment(self, power, limit)
+
     def band_limit(self, threshold: float) -> float:
         """Frequency in cycles per pixel beyond which the OTF is below ``threshold``."""
         return _band_limit(self, threshold)
@@ -69,3 +86,11 @@ class Optics:
 @lru_cache(maxsize=256)
 def _band_limit(optics: Optics, threshold: float) -> float:
     return optics.psf.band_limit(threshold) * optics.pixel_scale
+
+
+@lru_cache(maxsize=256)
+def _moment(optics: Optics, power: int, limit: float) -> float:
+    highest = min(max(optics.band_limit(1e-4 if power == 0 else 1e-9), 1e-9), limit)
+    k = (np.arange(2048) + 0.5) / 2048 * highest
+    transfer = np.abs(np.asarray(optics.transfer(np.zeros(1), k)[0]))
+    return 2 * np.pi * float(np.sum(k ** (power + 1) * transfer) * (k[1] - k[0]))

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .gaussians import Gaussians
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+# mesh points painted at a time: what a core's cache holds
+BATCH = 16384
+# sides of the painted patches are rounded up to a multiple of this, so that many are alike
+STEP = 6
 
 
 def paint(
@@ -16,14 +25,14 @@ def paint(
     cell: float,
     gaussians: Gaussians,
     spread: float,
-    cut: float,
+    cut: float | Array,
 ) -> None:
     """Add Gaussians to a mesh of densities (cps per pixel area).
 
     Parameters
     ----------
     mesh : ndarray, shape (ny, nx)
-        The mesh; every Gaussian must lie on it as far as it is cut.
+        The mesh; every Gaussian must lie on it as far as `half_patches` tells.
     start : (float, float)
         Position (y, x) of the mesh's first point, pixels.
     cell : float
@@ -32,69 +41,75 @@ def paint(
         What to paint.
     spread : float
         Standard deviation in pixels of a Gaussian by which each is widened.
-    cut : float
-        Distance in standard deviations beyond which a Gaussian is left out.
+    cut : float or ndarray, shape (n,)
+        Distance in standard deviations beyond which a Gaussian may be left out.
     """
     if not len(gaussians):
         return
     xx, yy, xy = gaussians.xx + spread**2, gaussians.yy + spread**2, gaussians.xy
     y = (gaussians.y - start[0]) / cell
     x = (gaussians.x - start[1]) / cell
-    same = gaussians.major == 0
-    if same.any():
-        _paint_points(mesh, y[same], x[same], gaussians.rate[same], spread, cell, cut)
-    for i in np.flatnonzero(~same):
-        _paint_one(mesh, y[i], x[i], gaussians.rate[i], yy[i], xy[i], xx[i], cell, cut)
-
-
-def _paint_one(
-    mesh: Array,
-    y: float,
-    x: float,
-    rate: float,
-    yy: float,
-    xy: float,
-    xx: float,
-    cell: float,
-    cut: float,
-) -> None:
-    rows = _support(y, cut * np.sqrt(yy) / cell)
-    columns = _support(x, cut * np.sqrt(xx) / cell)
-    dy = (np.arange(rows.start, rows.stop) - y) * cell
-    dx = (np.arange(columns.start, columns.stop) - x) * cell
+    half_y, half_x = half_patches(yy, cell, cut), half_patches(xx, cell, cut)
+    order = np.lexsort((half_x, half_y))
+    row, column = np.rint(y), np.rint(x)
     determinant = xx * yy - xy**2
-    height = rate / (2 * np.pi * np.sqrt(determinant))
-    if xy == 0:
-        row_part = height * np.exp(-0.5 * xx / determinant * dy**2)
-        mesh[rows, columns] += row_part[:, None] * np.exp(-0.5 * yy / determinant * dx**2)
-        return
-    # of the three factors the mixed one alone could overflow: exponents are added first
-    exponent = (xy / determinant * dy)[:, None] * dx
-    exponent -= (0.5 * xx / determinant * dy**2)[:, None]
-    exponent -= 0.5 * yy / determinant * dx**2
-    patch = np.exp(exponent, out=exponent)
-    patch *= height
-    mesh[rows, columns] += patch
+    rate = gaussians.rate
+    with np.errstate(divide="ignore"):
+        log_height = np.log(np.abs(rate) / (2 * np.pi * np.sqrt(determinant)))
+    # exponent a dy^2 + b dy dx + c dx^2 + log height, dy and dx in cells
+    a, b, c, log_height, dy, dx = (
+        values[order, None]
+        for values in (
+            -0.5 * cell**2 * xx / determinant,
+            cell**2 * xy / determinant,
+            -0.5 * cell**2 * yy / determinant,
+            log_height,
+            y - row,
+            x - column,
+        )
+    )
+    half_y, half_x, negative = half_y[order], half_x[order], rate[order] < 0
+    top = (row[order].astype(np.intp) - half_y).tolist()
+    left = (column[order].astype(np.intp) - half_x).tolist()
+    for batch in _batches(half_y, half_x):
+        h, w = int(half_y[batch.start]), int(half_x[batch.start])
+        in_y, in_x = _offsets(h) - dy[batch], _offsets(w) - dx[batch]
+        # the exponents as products of matrices, (n, ny, 3) by (n, 3, nx)
+        by_row = np.ones((*in_y.shape, 3))
+        by_column = np.ones((in_x.shape[0], 3, in_x.shape[1]))
+        by_row[:, :, 0] = b[batch] * in_y
+        by_column[:, 0] = in_x
+        by_row[:, :, 1] = a[batch] * in_y**2 + log_height[batch]
+        by_column[:, 2] = c[batch] * in_x**2
+        patches = by_row @ by_column
+        np.exp(patches, out=patches)
+        if negative[batch].any():
+            patches[negative[batch]] *= -1
+        ny, nx = in_y.shape[1], in_x.shape[1]
+        for r, k, patch in zip(top[batch], left[batch], patches, strict=True):
+            part = mesh[r : r + ny, k : k + nx]
+            part += patch
 
 
-def _support(centre: float, half: float) -> slice:
-    return slice(int(np.ceil(centre - half)), int(np.floor(centre + half)) + 1)
+def half_patches(variance: Array, cell: float, cut: float | Array) -> Indices:
+    """Half-sizes in cells of what is painted of Gaussians of a variance along an axis."""
+    half: Indices = (STEP * np.ceil(cut * np.sqrt(variance) / cell / STEP)).astype(np.intp)
+    return half
 
 
-def _paint_points(
-    mesh: Array, y: Array, x: Array, rate: Array, spread: float, cell: float, cut: float
-) -> None:
-    sigma = spread / cell
-    half = int(np.ceil(cut * sigma))
-    offsets = np.arange(-half, half + 1)
-    for first in range(0, y.size, 4096):
-        part = slice(first, first + 4096)
-        row, column = np.rint(y[part]).astype(np.intp), np.rint(x[part]).astype(np.intp)
-        rows = row[:, None] + offsets
-        columns = column[:, None] + offsets
-        in_y = np.exp(-0.5 * ((rows - y[part, None]) / sigma) ** 2)
-        in_x = np.exp(-0.5 * ((columns - x[part, None]) / sigma) ** 2)
-        in_y *= (rate[part] / (2 * np.pi * spread**2))[:, None]
-        index = (rows * mesh.shape[1])[:, :, None] + columns[:, None, :]
-        value = in_y[:, :, None] * in_x[:, None, :]
-        mesh += np.bincount(index.ravel(), value.ravel(), minlength=mesh.size).reshape(mesh.shape)
+@lru_cache(maxsize=512)
+def _offsets(half: int) -> Array:
+    return np.arange(-half, half + 1.0)
+
+
+def _batches(half_y: Indices, half_x: Indices) -> Iterator[slice]:
+    """Ranges of Gaussians whose patches are alike, few enough for the cache."""
+    change = (np.diff(half_y) != 0) | (np.diff(half_x) != 0)
+    ends = np.append(np.flatnonzero(change) + 1, half_y.size).tolist()
+    first = 0
+    for end in ends:
+        size = (2 * int(half_y[first]) + 1) * (2 * int(half_x[first]) + 1)
+        count = max(1, BATCH // size)
+        for begin in range(first, end, count):
+            yield slice(begin, min(begin + count, end))
+        first = end

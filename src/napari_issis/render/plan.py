@@ -19,7 +19,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+from scipy import fft, special
 
 from ..psf import RadialPSF
 from .optics import Optics
@@ -31,8 +31,8 @@ BAND = 0.35
 # Rings fainter than this, over the peak of the source that makes them, are not followed: they
 # reach over thousands of pixels.
 FAINTEST_RINGS = 1e-10
-# points of a mesh (0.4 GB) above which stamps are preferred
-COMFORTABLE_MESH = 5e7
+# the same for the fine mesh, whose result is only wanted at the pixels
+NEAR_BAND = 0.4
 
 
 @dataclass(frozen=True)
@@ -49,16 +49,36 @@ class Plan:
         The same for the rings of a diffraction PSF about the scene's sharpest source; zero or
         less where they do not matter.
     cell : float
-        Cell of the finest mesh, pixels; a power of two.
-    stamps : bool
-        Whether frequencies above the finest mesh's band are left to stamps.
+        Cell of the finest of the coarse meshes, pixels; a power of two, at least 1.
+    near : {"", "mesh", "stamps"}
+        What carries the frequencies above that mesh's band: nothing, a fine mesh or stamps.
     """
 
     optics: Optics
     digits: float
     ring_digits: float
     cell: float
-    stamps: bool
+    near: str
+
+    @property
+    def highest(self) -> float:
+        """Frequency in cycles per pixel above which nothing passes."""
+        return _highest(self.optics, self.digits)
+
+    @property
+    def near_unit(self) -> int:
+        """The fine mesh's period is a multiple of this many pixels."""
+        return 8
+
+    @property
+    def near_cell(self) -> float:
+        """Cell of the fine mesh in pixels: a multiple of it is a pixel, and FFTs are quick."""
+        least = int(np.ceil(self.near_unit * self.highest / NEAR_BAND))
+        return self.near_unit / fft.next_fast_len(least, real=True)
+
+    def near_spread(self) -> float:
+        """Width in pixels of the Gaussian with which points are spread on the fine mesh."""
+        return self.near_cell * _spread(self.digits, self.near_cell * self.highest)
 
     def without_rings(self) -> Plan:
         """Return the plan as far as filters depend on it: on the rings only reaches do."""
@@ -70,7 +90,7 @@ class Plan:
 
     def lowpass(self, k: Array, level: int) -> Array:
         """G of a level at frequencies k; it vanishes above the band of that level's mesh."""
-        if level == 0 and not self.stamps:
+        if level == 0 and not self.near:
             return np.ones_like(k)
         width = self._width(level)
         passed: Array = 0.5 * special.erfc((k - 1.4 * np.sqrt(self.digits) * width) / width)
@@ -85,22 +105,12 @@ class Plan:
         return float(BAND / self.cell_size(level) / (2.4 * np.sqrt(self.digits)))
 
     def spread(self) -> float:
-        """Width in cells of the Gaussian with which points are spread on a mesh.
-
-        Its aliases, exp(-2 pi^2 sigma^2 ((1 - BAND)^2 - BAND^2)), are below exp(-digits).
-        """
-        return float(np.sqrt(self.digits / (2 * np.pi**2 * (1 - 2 * BAND))))
-
-    def plain(self) -> float:
-        """Width in cells from which a Gaussian is band-limited on a mesh by itself."""
-        return float(np.sqrt(self.digits / 2) / (np.pi * BAND))
+        """Width in cells of the Gaussian with which points are spread on a coarse mesh."""
+        return _spread(self.digits, BAND)
 
     def cut(self) -> float:
-        """Distance in standard deviations at which a painted Gaussian is cut.
-
-        Dividing by the spreading Gaussian's transform amplifies the cut.
-        """
-        return float(np.sqrt(2 * 1.25 * self.digits))
+        """`spread_cut` for the plan's accuracy."""
+        return float(spread_cut(self.digits))
 
     def taps(self) -> int:
         """Half-length in cells of the filter that interpolates from one mesh to the next finer.
@@ -149,38 +159,59 @@ def make_plan(
     meshes_only : bool
         Whether a source is too large for a stamp.
     """
-    # a third of the error allowed, in quarter steps so that plans are shared
-    digits = float(np.ceil(4 * np.log(3 / max(accuracy, 1e-15))) / 4)
+    # a third of the error allowed, in half steps so that plans are shared
+    digits = float(np.ceil(2 * np.log(3 / max(accuracy, 1e-15))) / 2)
     ring_digits = float(np.ceil(2 * np.log(10 / max(ring_accuracy, FAINTEST_RINGS))) / 2)
     ring_digits = max(ring_digits, 0.0)
-    highest = max(optics.band_limit(0.1 * np.exp(-digits)), 1e-6)
+    highest = _highest(optics, digits)
     if sharp_edge:
         # leave room between the meshes' band and the edge
         cell = 2.0 ** np.ceil(np.log2(BAND / (0.7 * highest)))
-        return Plan(optics, digits, 0.0, max(cell, 0.5), stamps=True)
-    finest = 2.0 ** np.floor(np.log2(BAND / highest))
-    meshes = Plan(optics, digits, ring_digits, finest, stamps=False)
-    if finest >= 0.5 or meshes_only:
-        return meshes
-    stamps = Plan(optics, digits, ring_digits, 0.5, stamps=True)
-    if _seconds(meshes, shape, points, extended) < _seconds(stamps, shape, points, extended):
-        return meshes
+        return Plan(optics, digits, 0.0, max(cell, 1.0), near="stamps")
+    if highest <= BAND:
+        return Plan(optics, digits, ring_digits, 2.0 ** np.floor(np.log2(BAND / highest)), near="")
+    mesh = Plan(optics, digits, ring_digits, 1.0, near="mesh")
+    stamps = replace(mesh, near="stamps")
+    if meshes_only or _mesh_seconds(mesh, shape, points) < _stamp_seconds(stamps, points, extended):
+        return mesh
     return stamps
 
 
-def _seconds(plan: Plan, shape: tuple[int, int], points: int, extended: int) -> float:
-    """Rough run time on one core."""
-    reach = plan.reach(0)
-    mesh = float(np.prod([(n + reach) / plan.cell for n in shape]))
-    seconds = 3e-8 * mesh + 1e-8 * points * (2 * plan.cut() * plan.spread()) ** 2
-    if mesh > COMFORTABLE_MESH:
-        seconds *= mesh / COMFORTABLE_MESH
-    if plan.stamps:
-        pixels = 2 * plan.reach(-1) + 1
-        modes = pixels * plan.optics.band_limit(0.1 * np.exp(-plan.digits))
-        product = 2e-10 * (pixels * modes**2 + pixels**2 * modes)
-        seconds += points * product + extended * (4 * product + 1e-7 * modes**2)
-    return seconds
+@lru_cache(maxsize=256)
+def _highest(optics: Optics, digits: float) -> float:
+    return max(optics.band_limit(0.1 * np.exp(-digits)), 1e-6)
+
+
+def spread_cut(digits: float | Array) -> Array:
+    """Distance in standard deviations at which a spread Gaussian may be cut.
+
+    Dividing by the spreading Gaussian's transform amplifies the cut.
+    """
+    return np.sqrt(2 * 1.25 * np.asarray(digits))
+
+
+def _spread(digits: float, band: float) -> float:
+    """Width in cells of a Gaussian with which points are spread.
+
+    Its aliases, exp(-2 pi^2 sigma^2 ((1 - band)^2 - band^2)), are below exp(-digits).
+    """
+    return float(np.sqrt(digits / (2 * np.pi**2 * (1 - 2 * band))))
+
+
+def _mesh_seconds(plan: Plan, shape: tuple[int, int], points: int) -> float:
+    """Rough run time of the fine mesh."""
+    cell = plan.near_cell
+    edge = plan.reach(-1) + 2 * plan.cut() * plan.near_spread()
+    patch = (2 * plan.cut() * plan.near_spread() / cell) ** 2
+    return 1.1e-8 * float(np.prod([(n + edge) / cell for n in shape])) + 3e-9 * points * patch
+
+
+def _stamp_seconds(plan: Plan, points: int, extended: int) -> float:
+    """Rough run time of the stamps."""
+    pixels = 2 * plan.reach(-1) + 1
+    modes = pixels * plan.highest
+    product = 2e-10 * (pixels * modes**2 + pixels**2 * modes)
+    return points * product + extended * (4 * product + 1e-7 * modes**2)
 
 
 @lru_cache(maxsize=256)
@@ -220,7 +251,7 @@ def _rings(plan: Plan, level: int, start: float) -> tuple[Array, Array]:
     """
     psf = plan.optics.psf
     assert isinstance(psf, RadialPSF)
-    limit = plan.optics.band_limit(0.1 * np.exp(-plan.digits))
+    limit = plan.highest
     r = start * np.geomspace(1.0, 6.0, 160)
     # Gauss-Legendre on panels of less than two oscillations each
     x, w = np.polynomial.legendre.leggauss(16)

@@ -28,7 +28,7 @@ class GaussianSum:
     Attributes
     ----------
     sigma : ndarray, shape (n,)
-        Widths over the half-light radius.
+        Widths over the half-light radius, in ascending order for an index above 0.51.
     fraction : ndarray, shape (n,)
         Fluxes; they sum to 1.
     """
@@ -89,7 +89,8 @@ def sersic_gaussians(n: float, digits: float) -> GaussianSum:
     sigma = np.sqrt(0.5) * np.exp(-0.5 * log_t)
     # far wings are dropped by their light; in the cusp much less light makes a high peak
     kept = fraction > np.where(sigma > 1, 1e-3, 1e-14) * np.exp(-digits)
-    return GaussianSum(sigma[kept], fraction[kept] / fraction[kept].sum())
+    narrow_first = np.flatnonzero(kept)[::-1]
+    return GaussianSum(sigma[narrow_first], fraction[narrow_first] / fraction[kept].sum())
 
 
 def _nearly_gaussian(n: float, digits: float) -> GaussianSum:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..sources import SourceArrays
 from .discs import disc_half_sizes, elliptical_frequency
+from .near import high_pass
 from .optics import Transfer
 from .plan import Plan
 from .profiles import disc_envelope, disc_transform, sersic_gaussians, sersic_transform
@@ -105,17 +106,6 @@ def _both_signs(k: Array) -> Array:
     return np.concatenate([-k[:0:-1], k])
 
 
-def high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
-    """Transfer function above the meshes' band, on the grid (ky, kx) in cycles per pixel."""
-    k = np.hypot(ky[:, None], kx)
-    transfer: Transfer = plan.optics.transfer(ky, kx) * (1 - plan.lowpass(k, 0))
-    return transfer
-
-
-def _limit(plan: Plan) -> float:
-    return plan.optics.band_limit(0.1 * np.exp(-plan.digits))
-
-
 def _turned(grid: _Grid, tables: tuple[Array, Array], shift: Array) -> tuple[Array, Array]:
     """Cosine and sine of 2 pi k (m - shift) for each shift, shape (n, 2 half + 1, len(k))."""
     cos_m, sin_m = tables
@@ -126,7 +116,7 @@ def _turned(grid: _Grid, tables: tuple[Array, Array], shift: Array) -> tuple[Arr
 
 def _add_points(image: Array, plan: Plan, y: Array, x: Array, rate: Array, reach: float) -> None:
     half = int(np.ceil(reach))
-    limit = _limit(plan)
+    limit = plan.highest
     if not y.size or limit <= 0:
         return
     grid = _grid(half, limit)
@@ -215,7 +205,7 @@ def transform(one: SourceArrays, ky: Array, kx: Array) -> Array:
 
 def _needed_limit(plan: Plan, one: SourceArrays, rate: float, allowed: float) -> float:
     """Frequency beyond which a source's high-passed spectrum adds up to less than allowed."""
-    limit = _limit(plan)
+    limit = plan.highest
     if limit <= 0:
         return 0.0
     k, high = _radial_high_pass(plan, limit)
@@ -255,7 +245,7 @@ def _half_sizes(
         half_y, half_x = disc_half_sizes(one)
         return int(np.ceil(half_y[0] + reach)), int(np.ceil(half_x[0] + reach))
     gaussians = sersic_gaussians(float(one.index[0]), plan.digits + 3)
-    limit = _limit(plan)
+    limit = plan.highest
     k, high = _radial_high_pass(plan, limit)
     amplitude = 2 * np.pi * k * high * (limit / k.size)
     major = one.r_half[0] * gaussians.sigma

@@ -1,0 +1,204 @@
+"""The frequencies above the coarse meshes' band, on one fine mesh that covers the frame.
+
+What is too sharp for a mesh of whole pixels, points, cusps and edges, is painted on a mesh fine
+enough for every frequency that the PSF passes. Its transform is filtered and *folded* to the
+pixel rate, aliases summed, which is what a pixel-sampled image of an undersampled PSF is, and
+inverted at that rate only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from ..sources import SourceArrays
+from .discs import disc_half_sizes, paint_discs, paint_large_discs
+from .gaussians import Gaussians
+from .optics import Transfer
+from .painting import half_patches, paint
+from .plan import Plan, spread_cut
+from .threads import cores, in_threads
+
+Array = NDArray[np.float64]
+Spectrum = NDArray[np.complex128]
+
+# points of the mesh, some 2 GB of memory in all
+LARGEST_MESH = 1.3e8
+# columns transformed at a time
+COLUMNS = 32
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: position of the first point, period in pixels, points, and kept frequencies.
+
+    The frequencies are the multiples of 1 / period from 0 to ``modes``.
+    """
+
+    start: int
+    period: int
+    count: int
+    modes: int
+
+
+def near_rate(
+    plan: Plan,
+    shape: tuple[int, int],
+    gaussians: Gaussians,
+    digits: Array,
+    discs: SourceArrays,
+    disc_rate: Array,
+    large: SourceArrays,
+    large_rate: Array,
+) -> Array:
+    """Count rate above the coarse meshes' frequencies.
+
+    Parameters
+    ----------
+    plan : Plan
+        Filters and ranges.
+    shape : (int, int)
+        Frame (ny, nx) in pixels.
+    gaussians : Gaussians
+        Points and narrow Gaussians that are felt in the frame.
+    digits : ndarray
+        Natural logarithms of their accuracies.
+    discs, large : SourceArrays
+        Uniform ellipses that are felt in the frame, and such as are painted only as far as
+        they lie on the mesh.
+    disc_rate, large_rate : ndarray
+        Their count rates.
+
+    Returns
+    -------
+    ndarray, shape (ny, nx)
+
+    Raises
+    ------
+    ValueError
+        If the mesh would not fit into memory.
+    """
+    cut = spread_cut(digits)
+    axes = _axes(plan, shape, gaussians, cut, discs, bool(len(large)))
+    y, x = axes
+    if y.count * x.count > LARGEST_MESH:
+        raise ValueError(
+            f"this accuracy needs a mesh of {y.count} x {x.count} points, because the PSF's "
+            "diffraction rings reach far; choose a larger tolerance, a smaller frame or a PSF "
+            "averaged over a band."
+        )
+    mesh = np.zeros((y.count, x.count))
+    start, cell, spread = (float(y.start), float(x.start)), plan.near_cell, plan.near_spread()
+    paint(mesh, start, cell, gaussians, spread, cut)
+    paint_discs(mesh, start, cell, discs, disc_rate, spread, plan.cut())
+    if len(large):
+        paint_large_discs(mesh, start, cell, large, large_rate, spread, plan.digits)
+    spectrum = _filtered(mesh, y, x, _filter(plan.without_rings(), y.period, x.period))
+    del mesh
+    values = fft.irfft2(spectrum, (y.period, x.period), workers=-1, overwrite_x=True)
+    rows, columns = -y.start + np.arange(shape[0]), -x.start + np.arange(shape[1])
+    wanted: Array = values[np.ix_(rows % y.period, columns % x.period)]
+    return wanted
+
+
+def _axes(
+    plan: Plan,
+    shape: tuple[int, int],
+    gaussians: Gaussians,
+    cut: Array,
+    discs: SourceArrays,
+    large: bool,
+) -> tuple[Axis, Axis]:
+    """Lay out a mesh that holds what is painted and where the kernel does not wrap around."""
+    cell, spread, reach = plan.near_cell, plan.near_spread(), plan.reach(-1)
+    disc_half = disc_half_sizes(discs)
+    axes = []
+    for axis in (0, 1):
+        # at least so much, that scenes in the frame share their filters
+        edge = cell * float(half_patches(np.array(spread**2), cell, plan.cut()) + 1)
+        edge += reach if large else 0.0
+        low, high = -edge, shape[axis] - 1 + edge
+        variance = (gaussians.yy, gaussians.xx)[axis] + spread**2
+        for centre, half in (
+            ((gaussians.y, gaussians.x)[axis], cell * (half_patches(variance, cell, cut) + 1)),
+            ((discs.y, discs.x)[axis], disc_half[axis] * 1.1 + plan.cut() * spread + 12 * cell),
+        ):
+            low = min(low, float((centre - half).min(initial=np.inf)))
+            high = max(high, float((centre + half).max(initial=-np.inf)))
+        start = int(np.floor(low))
+        need = max(high - start, shape[axis] - 1 + reach - low, high + reach) + 1
+        period = plan.near_unit * fft.next_fast_len(int(np.ceil(need / plan.near_unit)), real=True)
+        axes.append(Axis(start, period, round(period / cell), int(plan.highest * period)))
+    return axes[0], axes[1]
+
+
+@lru_cache(maxsize=24)
+def _filter(plan: Plan, period_y: int, period_x: int) -> Transfer:
+    """Filter of the mesh at the frequencies kept: ky and kx >= 0, or both signs of ky.
+
+    It takes back the spreading and holds the area of a cell.
+    """
+    cell, spread = plan.near_cell, plan.near_spread()
+    ky, kx = (np.arange(int(plan.highest * p) + 1) / p for p in (period_y, period_x))
+    if not plan.optics.radial:
+        ky = np.concatenate([ky, -ky[:0:-1]])
+    filtered = high_pass(plan, ky, kx)
+    filtered *= cell**2 * np.exp(2 * (np.pi * spread * ky) ** 2)[:, None]
+    filtered *= np.exp(2 * (np.pi * spread * kx) ** 2)
+    return filtered
+
+
+def high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
+    """Transfer function above the meshes' band, on the grid (ky, kx) in cycles per pixel."""
+    k = np.hypot(ky[:, None], kx)
+    transfer: Transfer = plan.optics.transfer(ky, kx, plan.highest) * (1 - plan.lowpass(k, 0))
+    return transfer
+
+
+def _filtered(mesh: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
+    """Half-spectrum at the pixel rate of a mesh, filtered, all aliases summed."""
+    half = fft.rfft(mesh, axis=1, workers=-1)[:, : x.modes + 1]
+    radial = filtered.shape[0] == y.modes + 1
+    folded = np.empty((y.period, x.modes + 1), dtype=np.complex128)
+
+    def fold_columns(columns: slice) -> None:
+        spectrum = fft.fft(np.ascontiguousarray(half[:, columns].T), axis=1, overwrite_x=True)
+        weight = filtered[:, columns].T
+        upper = spectrum[:, : y.modes + 1] * weight[:, : y.modes + 1]
+        lower = spectrum[:, y.count - y.modes :]
+        lower *= weight[:, :0:-1] if radial else weight[:, y.modes + 1 :]
+        sums = np.zeros((spectrum.shape[0], y.period), dtype=np.complex128)
+        for first in range(0, y.modes + 1, y.period):
+            part = upper[:, first : first + y.period]
+            sums[:, : part.shape[1]] += part
+        for last in range(y.modes, 0, -y.period):
+            part = lower[:, max(last - y.period, 0) : last]
+            sums[:, y.period - part.shape[1] :] += part
+        folded[:, columns] = sums.T
+
+    step = min(COLUMNS, -(-(x.modes + 1) // cores()))
+    for _ in in_threads(fold_columns, (slice(i, i + step) for i in range(0, x.modes + 1, step))):
+        pass
+    return _fold_x(folded, x)
+
+
+def _fold_x(spectrum: Spectrum, x: Axis) -> Spectrum:
+    """Sum the aliases in x; frequencies below zero are the conjugates of those above."""
+    middle = x.period // 2
+    result = np.zeros((spectrum.shape[0], middle + 1), dtype=np.complex128)
+    for first in range(0, x.modes + 1, x.period):
+        part = spectrum[:, first : first + middle + 1]
+        result[:, : part.shape[1]] += part
+    # -kx = -j is an alias of (n + 1) period - j
+    for n in range(x.modes // x.period + 1):
+        end = (n + 1) * x.period
+        low, high = max(end - middle, 1), min(end, x.modes)
+        if low <= high:
+            part = spectrum[:, low : high + 1][:, ::-1]
+            result[0, end - high : end - low + 1] += part[0].conj()
+            result[1:, end - high : end - low + 1] += part[:0:-1].conj()
+    return result

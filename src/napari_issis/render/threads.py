@@ -1,0 +1,41 @@
+"""Work spread over the processor's cores; numpy lets go of Python's lock in its loops."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import lru_cache
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@lru_cache(maxsize=1)
+def _pool(process: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(cores(), thread_name_prefix="napari-issis")
+
+
+def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """Results of ``work`` in the order of the items, a few of them made ahead."""
+    if cores() == 1:
+        yield from map(work, items)
+        return
+    # a child of os.fork has no threads: it makes its own
+    pool = _pool(os.getpid())
+    ahead: deque[Future[Result]] = deque()
+    for item in items:
+        ahead.append(pool.submit(work, item))
+        if len(ahead) > 2 * cores():
+            yield ahead.popleft().result()
+    while ahead:
+        yield ahead.popleft().result()

@@ -1,0 +1,24 @@
+"""How long the stress tests run.
+
+By default the random scenes are 50 and hypothesis tries few examples: seconds. The long run,
+
+    STRESS_SCENES=1000 python -m pytest tests/stress
+
+tries that many scenes, and as many examples in proportion. Both are deterministic.
+"""
+
+import os
+
+from hypothesis import settings
+
+SCENES = int(os.environ.get("STRESS_SCENES", "50"))
+
+settings.register_profile(
+    "stress", derandomize=True, deadline=None, max_examples=max(SCENES // 5, 10), database=None
+)
+settings.load_profile("stress")
+
+
+def pytest_generate_tests(metafunc):
+    if "scene_seed" in metafunc.fixturenames:
+        metafunc.parametrize("scene_seed", range(SCENES))
