@@ -88,9 +88,7 @@ def _disc_pixel(share, along, across, reach, sigma, r_half, ratio, n):
     value = 0.0
     for p, dp in zip(phi, dphi, strict=True):
         chord = b * np.cos(p)
-        v, dv = (
-            np.clip((across + d) / chord, -1, 1) * chord for d in (-reach, reach)
-        )
+        v, dv = (np.clip((across + d) / chord, -1, 1) * chord for d in (-reach, reach))
         if v == dv:
             continue
         v, dv = composite(np.linspace(v, dv, int((dv - v) / (1.2 * sigma)) + 2))

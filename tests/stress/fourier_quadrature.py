@@ -164,7 +164,9 @@ def rate(source, pixels, system):
     passed = weight * k * otf(k.ravel()).reshape(k.shape)
     result = np.zeros(len(pixels))
     for panel, share in zip(k, passed, strict=True):
-        count = int(1.2 * np.pi * panel[-1] * far + 24 + (30 / (1 - ellipticity) if size or r_half else 0))
+        count = int(
+            1.2 * np.pi * panel[-1] * far + 24 + (30 / (1 - ellipticity) if size or r_half else 0)
+        )
         theta = np.pi * (np.arange(count) + 0.5) / count
         kx, ky = np.outer(panel, np.cos(theta)), np.outer(panel, np.sin(theta))
         along = ky * np.cos(angle) - kx * np.sin(angle)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import special
 
 import napari_issis as ni
 
@@ -45,9 +46,10 @@ def test_the_largest_expected_counts():
 def test_beyond_is_a_clear_error():
     """Catches counts that overflow silently: the one pixel beyond 1e15 is named, with its value."""
     observation = OBSERVATION.replace(psf=ni.GaussianPSF(0.01), exposure=1e9)
-    # all but 1e-5 of 1.14e17 cps per unit flux falls into the star's pixel
+    sigma = 0.01 / 0.036 / np.sqrt(8 * np.log(2))
+    share = special.erf(0.5 / (np.sqrt(2) * sigma)) ** 2
     below = ni.simulate(ni.source("point", 20.0, 17.0, 8.7e-12), observation)
-    assert below.counts[17, 20] == pytest.approx(8.7e-12 * 1.14e26, rel=1e-5)
+    assert below.counts[17, 20] == pytest.approx(share * 8.7e-12 * 1.14e26, rel=2e-6)
     with pytest.raises(ValueError, match=r"\[17, 20\] expects 1.003e[+]15 counts"):
         ni.simulate(ni.source("point", 20.0, 17.0, 8.8e-12), observation)
 

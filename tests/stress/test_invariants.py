@@ -79,9 +79,7 @@ def test_half_turn(seed):
 def test_transposition(seed):
     """Catches axes treated differently, and the sense of rotation: pa becomes 90 - pa."""
     scene = random_scene(seed)
-    transposed = [
-        (f, kind, y, x, r, e, 90 - pa, n) for f, kind, x, y, r, e, pa, n in scene.sources
-    ]
+    transposed = [(f, kind, y, x, r, e, 90 - pa, n) for f, kind, x, y, r, e, pa, n in scene.sources]
     first, error = render(scene, 1e-6)
     second, second_error = render(scene, 1e-6, shape=scene.shape[::-1], sources=transposed)
     assert np.abs(first.T - second).max() <= error + second_error
@@ -114,9 +112,10 @@ def test_true_negative_light_is_removed_and_reported(step):
     psf = ni.ImagePSF([[1.0]], step * PIXEL, includes_pixel=True)
     observation = ni.Observation(shape=(15, 18), psf=psf, exposure=50.0)
     exposure = ni.simulate(ni.source("point", 8.3, 7.4, 1e-15), observation)
-    image = np.outer(
-        np.sinc((np.arange(15) - 7.4) / step), np.sinc((np.arange(18) - 8.3) / step)
-    ) / step**2
+    image = (
+        np.outer(np.sinc((np.arange(15) - 7.4) / step), np.sinc((np.arange(18) - 8.3) / step))
+        / step**2
+    )
     expected = 1e-15 * CPS * image
     assert expected.min() < -0.01 * expected.max()
     bound = 50.0 * 1e-6 * expected.max()

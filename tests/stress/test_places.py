@@ -120,5 +120,3 @@ def test_a_small_step_moves_the_light(shift):
     moved = 1e-14 * CPS * (second - first)
     assert np.abs(after - before - moved).max() <= 2e-10 * before.max()
     assert np.abs(moved).max() > 100 * 2e-10 * before.max()
-
-

@@ -2,8 +2,8 @@
 
 import ellipse_quadrature
 import fourier_quadrature
-import mpmath
 import moffat_star
+import mpmath
 import numpy as np
 import pytest
 

@@ -17,7 +17,7 @@ SIGMA_PER_FWHM = 1 / np.sqrt(8 * np.log(2))
 
 def check(source, fwhm, tolerance):
     """Compare the brightest pixel, the corners and the source's own pixel with quadrature."""
-    kind, x, y, r_half, ellipticity, pa, n = source
+    x, y = source[1:3]
     observation = ni.Observation(shape=SHAPE, psf=psf_of("gaussian", (fwhm,)))
     image = ni.count_rate(table_of([(1e-14, *source)]), observation, tolerance=tolerance)
     pixels = {tuple(int(i) for i in np.unravel_index(image.argmax(), SHAPE)), (0, 21), (16, 0)}
