@@ -11,7 +11,7 @@ from ..psf import RadialPSF
 from ..sources import SourceArrays, check_sources
 from .direct import add_direct, has_sharp_edge
 from .gaussians import NODES, decompose
-from .meshes import mesh_rate
+from .meshes import LARGEST_DISC, mesh_rate
 from .optics import Optics
 from .plan import BAND, make_plan
 from .profiles import disc_envelope, sersic_transform
@@ -92,7 +92,7 @@ def render(
         if absolute is not None:
             allowed = min(allowed, max(absolute, floor * peak))
         allowed = max(allowed, least)
-        image = _render(optics, observation.shape, arrays, rate, allowed, float(own_peak.max()))
+        image = _render(optics, observation.shape, arrays, rate, allowed, own_peak)
         found = float(image.max())
         if allowed <= least or found >= 0.5 * peak:
             return image
@@ -105,9 +105,10 @@ def _render(
     sources: SourceArrays,
     rate: Array,
     allowed: float,
-    brightest: float,
+    own_peak: Array,
 ) -> Array:
     """Render with an error of at most ``allowed`` cps per pixel."""
+    brightest = float(own_peak.max())
     is_point, is_disc = sources.kind == "point", sources.kind == "uniform"
     sharp_edge = has_sharp_edge(
         optics, 0.1 * allowed / brightest, optics.extent + 50.0, optics.point_area
@@ -117,6 +118,7 @@ def _render(
         shape,
         allowed / brightest,
         allowed / max(_ring_amplitude(optics, sources, rate), 1e-300),
+        _farthest(sources, shape),
         int(is_point.sum()),
         int((~is_point).sum()),
         sharp_edge,
@@ -126,9 +128,7 @@ def _render(
     gaussians = decompose(
         sources.take(~is_disc),
         rate[~is_disc],
-        plan.digits
-        + 1.0
-        + np.log(np.minimum(peaks(optics, sources, rate)[~is_disc] / brightest, 1.0)),
+        plan.digits + 1.0 + np.log(np.minimum(own_peak[~is_disc] / brightest, 1.0)),
         optics.moment(4 * NODES, np.inf if plan.near == "mesh" else BAND / plan.cell),
         share / np.sqrt(len(sources)),
         plan.near_cell if plan.near == "mesh" else plan.cell,
@@ -155,6 +155,16 @@ def _ring_amplitude(optics: Optics, sources: SourceArrays, rate: Array) -> float
         chosen = sources.index == n
         sharp[chosen] = sersic_transform(float(n), q[chosen])
     return float((rate * sharp).max()) / optics.point_area
+
+
+def _farthest(sources: SourceArrays, shape: tuple[int, int]) -> float:
+    """Largest distance in pixels between a source that is not far away and a pixel."""
+    y, x = (np.clip(p, -n, 2 * n) for p, n in zip((sources.y, sources.x), shape, strict=True))
+    half = np.sqrt(2) * np.minimum(sources.r_half, LARGEST_DISC)
+    half[sources.kind == "point"] = 0.0
+    away_y = np.maximum(y + half, shape[0] - 1 - y + half)
+    away_x = np.maximum(x + half, shape[1] - 1 - x + half)
+    return float(np.hypot(away_y, away_x).max())
 
 
 def peaks(optics: Optics, sources: SourceArrays, rate: Array) -> Array:

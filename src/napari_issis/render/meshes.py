@@ -15,8 +15,9 @@ from .gaussians import Gaussians
 from .interpolation import Span, add_up, spans
 from .near import near_rate
 from .optics import Transfer
-from .painting import half_patches, paint
+from .painting import half_patch, half_patches, paint
 from .plan import BAND, Plan, spread_cut
+from .rings import Band, band_transfer
 
 # Uniform ellipses wider than this, in pixels, are painted on every mesh as far as they lie on it,
 # instead of once and whole.
@@ -113,7 +114,7 @@ def mesh_rate(
     )
     total = float(sum(np.abs(r).sum() for r in (gaussians.rate, disc_rate, large_rate)))
     top = max(int(level_of.max(initial=0)), int(disc_level.max(initial=0)))
-    while _wings(plan, top, shape, total) > 0.03 * allowed:
+    while _wings(plan, top, shape, total) > 0.03 * allowed or plan.cuts_rings(top):
         top += 1
     results: list[Array | None] = []
     passed: Density | None = None
@@ -249,7 +250,7 @@ class _Mesh:
             low, high = frame[axis][0] * self.cell, frame[axis][1] * self.cell
             reach = plan.reach(level)
             # the same for all scenes that lie in the frame, so that filters can be kept
-            edge = self.cell * (half_patches(np.array(sigma**2), self.cell, cut) + 1.0)
+            edge = self.cell * (half_patch(sigma**2, self.cell, cut) + 1.0)
             edge += reach if len(large) else 0.0
             extent = [low - edge, high + edge]
             for centre, half in (
@@ -335,7 +336,7 @@ class _Mesh:
         return spectrum, onward
 
     def _filter(self, *, spread: bool) -> Transfer:
-        return _filter(self.plan.without_rings(), self.level, self.last, self.shape, spread)
+        return _filter(self.plan.filters, self.level, self.last, self.shape, spread)
 
     def _widening(self, to: float, already: float) -> tuple[Array, Array]:
         """Transform of the Gaussian that widens from ``already`` to ``to`` cells' spreading."""
@@ -392,19 +393,13 @@ def _filter(plan: Plan, level: int, last: bool, shape: tuple[int, int], spread: 
         # even in ky: half of the rows hold everything
         rows = np.minimum(rows, shape[0] - rows)
         ky = np.abs(ky[: shape[0] // 2 + 1])
-    k = np.hypot(ky[:, None], kx)
-    if spread or plan.near == "stamps":
-        passed = plan.lowpass(k, level if spread else 0)
-    else:
-        passed = np.ones_like(k)
-    if not last:
-        passed = passed - plan.lowpass(k, level + 1)
-    passed[k > limit] = 0.0
+    # with stamps, level 0 has lost its highest frequencies to them
+    first = level if spread else (0 if plan.near == "stamps" else -1)
+    filtered = band_transfer(plan, Band(level, first, None if last else level + 1), ky, kx, limit)
     if spread:
         sigma = plan.spread() * cell
-        for frequency, shape_ in ((ky, (-1, 1)), (kx, (1, -1))):
-            passed *= np.exp(2 * (np.pi * sigma * frequency) ** 2).reshape(shape_)
-    filtered = plan.optics.transfer(ky, kx, limit) * passed
+        filtered *= np.exp(2 * (np.pi * sigma * ky) ** 2)[:, None]
+        filtered *= np.exp(2 * (np.pi * sigma * kx) ** 2)
     return filtered[rows]
 
 

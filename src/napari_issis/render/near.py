@@ -19,8 +19,9 @@ from ..sources import SourceArrays
 from .discs import disc_half_sizes, paint_discs, paint_large_discs
 from .gaussians import Gaussians
 from .optics import Transfer
-from .painting import half_patches, paint
+from .painting import half_patch, half_patches, paint
 from .plan import Plan, spread_cut
+from .rings import Band, band_transfer
 from .threads import cores, in_threads
 
 Array = NDArray[np.float64]
@@ -97,7 +98,7 @@ def near_rate(
     paint_discs(mesh, start, cell, discs, disc_rate, spread, plan.cut())
     if len(large):
         paint_large_discs(mesh, start, cell, large, large_rate, spread, plan.digits)
-    spectrum = _filtered(mesh, y, x, _filter(plan.without_rings(), y.period, x.period))
+    spectrum = _filtered(mesh, y, x, _filter(plan.filters, y.period, x.period))
     del mesh
     values = fft.irfft2(spectrum, (y.period, x.period), workers=-1, overwrite_x=True)
     rows, columns = -y.start + np.arange(shape[0]), -x.start + np.arange(shape[1])
@@ -119,7 +120,7 @@ def _axes(
     axes = []
     for axis in (0, 1):
         # at least so much, that scenes in the frame share their filters
-        edge = cell * float(half_patches(np.array(spread**2), cell, plan.cut()) + 1)
+        edge = cell * (half_patch(spread**2, cell, plan.cut()) + 1.0)
         edge += reach if large else 0.0
         low, high = -edge, shape[axis] - 1 + edge
         variance = (gaussians.yy, gaussians.xx)[axis] + spread**2
@@ -154,9 +155,8 @@ def _filter(plan: Plan, period_y: int, period_x: int) -> Transfer:
 
 def high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
     """Transfer function above the meshes' band, on the grid (ky, kx) in cycles per pixel."""
-    k = np.hypot(ky[:, None], kx)
-    transfer: Transfer = plan.optics.transfer(ky, kx, plan.highest) * (1 - plan.lowpass(k, 0))
-    return transfer
+    limit = plan.highest if plan.optics.radial else np.inf
+    return band_transfer(plan, Band(-1, -1, 0), ky, kx, limit)
 
 
 def _filtered(mesh: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:

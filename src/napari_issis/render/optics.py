@@ -78,9 +78,13 @@ class Optics:
         else:
             transfer = self.psf.otf_grid(ky / self.pixel_scale, kx / self.pixel_scale)
         if not self.psf.includes_pixel:
-            transfer *= np.sinc(ky)[:, None]
-            transfer *= np.sinc(kx)[None, :]
+            transfer *= self.pixel(ky, kx)
         return transfer
+
+    def pixel(self, ky: Array, kx: Array) -> Array:
+        """Transform of the pixel's square on the grid (ky, kx)."""
+        square: Array = np.sinc(ky)[:, None] * np.sinc(kx)
+        return square
 
 
 @lru_cache(maxsize=256)

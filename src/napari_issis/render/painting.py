@@ -97,6 +97,11 @@ def half_patches(variance: Array, cell: float, cut: float | Array) -> Indices:
     return half
 
 
+def half_patch(variance: float, cell: float, cut: float) -> int:
+    """`half_patches` of one Gaussian."""
+    return int(half_patches(np.array([variance]), cell, cut)[0])
+
+
 @lru_cache(maxsize=512)
 def _offsets(half: int) -> Array:
     return np.arange(-half, half + 1.0)

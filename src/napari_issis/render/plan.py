@@ -21,18 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, special
 
-from ..psf import RadialPSF
 from .optics import Optics
+from .rings import first_edge, ring_reach, taper
 
 Array = NDArray[np.float64]
 
 # highest frequency used on a mesh, cycles per cell (0.5 would be its Nyquist frequency)
 BAND = 0.35
-# Rings fainter than this, over the peak of the source that makes them, are not followed: they
-# reach over thousands of pixels.
-FAINTEST_RINGS = 1e-10
 # the same for the fine mesh, whose result is only wanted at the pixels
 NEAR_BAND = 0.4
+# rings are cut at multiples of this distance in pixels, so that filters are shared
+RING_STEP = 64.0
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,8 @@ class Plan:
         Cell of the finest of the coarse meshes, pixels; a power of two, at least 1.
     near : {"", "mesh", "stamps"}
         What carries the frequencies above that mesh's band: nothing, a fine mesh or stamps.
+    ring_cut : float
+        Distance in pixels behind which rings may be cut; inf where they are followed.
     """
 
     optics: Optics
@@ -59,6 +60,7 @@ class Plan:
     ring_digits: float
     cell: float
     near: str
+    ring_cut: float = np.inf
 
     @property
     def highest(self) -> float:
@@ -74,14 +76,15 @@ class Plan:
     def near_cell(self) -> float:
         """Cell of the fine mesh in pixels: a multiple of it is a pixel, and FFTs are quick."""
         least = int(np.ceil(self.near_unit * self.highest / NEAR_BAND))
-        return self.near_unit / fft.next_fast_len(least, real=True)
+        return self.near_unit / int(fft.next_fast_len(least, real=True))
 
     def near_spread(self) -> float:
         """Width in pixels of the Gaussian with which points are spread on the fine mesh."""
         return self.near_cell * _spread(self.digits, self.near_cell * self.highest)
 
-    def without_rings(self) -> Plan:
-        """Return the plan as far as filters depend on it: on the rings only reaches do."""
+    @property
+    def filters(self) -> Plan:
+        """The plan as far as filters depend on it: on how faint rings matter only reaches do."""
         return replace(self, ring_digits=0.0)
 
     def cell_size(self, level: int) -> float:
@@ -126,8 +129,36 @@ class Plan:
         return float(20 / np.log(10) * (self.digits + 2.5))
 
     def reach(self, level: int) -> float:
-        """Distance in pixels to which a level's kernel is felt; level -1 is the stamps'."""
-        return _reach(self, level)
+        """Distance in pixels to which a level's kernel is felt; level -1 is the fine mesh's."""
+        reach = self._without_rings(level)
+        if self.ring_digits > 0 and self._has_rings(level):
+            reach = max(reach, min(_ring_reach(self, level), self.ring_end(level)))
+        return reach
+
+    def cuts_rings(self, level: int) -> bool:
+        """Whether a level's rings are cut behind the farthest pixel."""
+        end = self.ring_end(level)
+        return self._has_rings(level) and self._without_rings(level) < end < np.inf
+
+    def ring_end(self, level: int) -> float:
+        """Distance in pixels at which a level's rings have been cut."""
+        cell = self.cell_size(level) if level >= 0 else 0.0
+        margin = 4 * self.taps() * cell if cell > 1 else 0.0
+        return self.ring_cut + margin + taper(self.optics)
+
+    def _without_rings(self, level: int) -> float:
+        # the filter's edge has the transform exp(-pi^2 width^2 r^2)
+        reach = np.sqrt(self.digits) / (np.pi * self._width(level + 1))
+        return float(reach) + self.optics.extent
+
+    def _has_rings(self, level: int) -> bool:
+        highest = BAND / self.cell_size(level) if level >= 0 else np.inf
+        return first_edge(self.optics) <= highest
+
+
+@lru_cache(maxsize=256)
+def _ring_reach(plan: Plan, level: int) -> float:
+    return ring_reach(plan, level, plan._without_rings(level))
 
 
 def make_plan(
@@ -135,6 +166,7 @@ def make_plan(
     shape: tuple[int, int],
     accuracy: float,
     ring_accuracy: float,
+    farthest: float,
     points: int,
     extended: int,
     sharp_edge: bool = False,
@@ -152,6 +184,8 @@ def make_plan(
         Error allowed over the brightest source's peak.
     ring_accuracy : float
         Error allowed over the amplitude of the sharpest source's rings.
+    farthest : float
+        Largest distance in pixels between a pixel and a source whose rings matter.
     points, extended : int
         Numbers of sources.
     sharp_edge : bool
@@ -161,20 +195,29 @@ def make_plan(
     """
     # a third of the error allowed, in half steps so that plans are shared
     digits = float(np.ceil(2 * np.log(3 / max(accuracy, 1e-15))) / 2)
-    ring_digits = float(np.ceil(2 * np.log(10 / max(ring_accuracy, FAINTEST_RINGS))) / 2)
-    ring_digits = max(ring_digits, 0.0)
+    ring_digits = max(float(np.ceil(2 * np.log(10 / max(ring_accuracy, 1e-15))) / 2), 0.0)
     highest = _highest(optics, digits)
     if sharp_edge:
         # leave room between the meshes' band and the edge
         cell = 2.0 ** np.ceil(np.log2(BAND / (0.7 * highest)))
         return Plan(optics, digits, 0.0, max(cell, 1.0), near="stamps")
     if highest <= BAND:
-        return Plan(optics, digits, ring_digits, 2.0 ** np.floor(np.log2(BAND / highest)), near="")
-    mesh = Plan(optics, digits, ring_digits, 1.0, near="mesh")
+        cell = 2.0 ** np.floor(np.log2(BAND / highest))
+        return _with_rings_cut(Plan(optics, digits, ring_digits, cell, near=""), farthest)
+    mesh = _with_rings_cut(Plan(optics, digits, ring_digits, 1.0, near="mesh"), farthest)
     stamps = replace(mesh, near="stamps")
     if meshes_only or _mesh_seconds(mesh, shape, points) < _stamp_seconds(stamps, points, extended):
         return mesh
     return stamps
+
+
+def _with_rings_cut(plan: Plan, farthest: float) -> Plan:
+    """Cut the rings of a plan if they reach further than needed."""
+    cut = RING_STEP * float(np.ceil(farthest / RING_STEP))
+    first = -1 if plan.near else 0
+    if all(plan.reach(level) <= cut for level in range(first, 3) if plan._has_rings(level)):
+        return plan
+    return replace(plan, ring_cut=cut)
 
 
 @lru_cache(maxsize=256)
@@ -212,58 +255,3 @@ def _stamp_seconds(plan: Plan, points: int, extended: int) -> float:
     modes = pixels * plan.highest
     product = 2e-10 * (pixels * modes**2 + pixels**2 * modes)
     return points * product + extended * (4 * product + 1e-7 * modes**2)
-
-
-@lru_cache(maxsize=256)
-def _reach(plan: Plan, level: int) -> float:
-    # the filter's edge has the transform exp(-pi^2 width^2 r^2)
-    window = float(np.sqrt(plan.digits) / (np.pi * plan._width(level + 1)))
-    psf = plan.optics.psf
-    if not isinstance(psf, RadialPSF):
-        return window + plan.optics.extent
-    edge = psf.first_edge() * plan.optics.pixel_scale
-    highest = BAND / plan.cell_size(level) if level >= 0 else np.inf
-    if plan.ring_digits <= 0 or edge > highest:
-        return window
-    return max(window, _ring_reach(plan, level, window))
-
-
-def _ring_reach(plan: Plan, level: int, start: float) -> float:
-    """Distance at which a kernel's rings are below the accuracy.
-
-    The edges of the aperture and of its obscuration make rings that fall like r^-3 only. They
-    are measured out to six times the filter's own reach, and beyond that follow their law.
-    """
-    r, envelope = _rings(plan.without_rings(), level, start)
-    allowed = 0.3 * np.exp(-plan.ring_digits)
-    below = np.flatnonzero(envelope <= allowed)
-    if below.size:
-        return float(r[below[0]])
-    return float(r[-1] * (envelope[-16] / allowed) ** (1 / 3))
-
-
-@lru_cache(maxsize=64)
-def _rings(plan: Plan, level: int, start: float) -> tuple[Array, Array]:
-    """Radii in pixels and the largest amplitude of a level's kernel beyond each.
-
-    The amplitude is over a point source's peak; the kernel is the Hankel transform of its
-    filter.
-    """
-    psf = plan.optics.psf
-    assert isinstance(psf, RadialPSF)
-    limit = plan.highest
-    r = start * np.geomspace(1.0, 6.0, 160)
-    # Gauss-Legendre on panels of less than two oscillations each
-    x, w = np.polynomial.legendre.leggauss(16)
-    panels = int(limit * r[-1]) + 8
-    k = ((np.arange(panels)[:, None] + 0.5 * (x + 1)) * (limit / panels)).ravel()
-    weight = np.tile(w, panels)
-    measure = weight * k * psf.otf(k / plan.optics.pixel_scale)
-    # for the peak, the pixel as a Gaussian of the same variance
-    peak = abs(np.sum(measure * np.exp(-(np.pi**2) * k**2 / 6)))
-    # a ring is averaged least in the direction of the pixel's sides: the envelope of sinc(k)
-    measure /= np.sqrt(1 + (np.pi * k) ** 2)
-    passed = np.ones_like(k) if level < 0 else plan.lowpass(k, level)
-    band = measure * (passed - plan.lowpass(k, level + 1))
-    kernel = np.abs(special.j0(2 * np.pi * np.outer(r, k)) @ band) / peak
-    return r, np.maximum.accumulate(kernel[::-1])[::-1]

@@ -44,7 +44,7 @@ def add_stamps(
         out, and so are frequencies that add up to less.
     """
     reach = plan.reach(-1)
-    plan = plan.without_rings()
+    plan = plan.filters
     is_point = sources.kind == "point"
     points = is_point & _within(sources, reach, image.shape)
     _add_points(image, plan, sources.y[points], sources.x[points], rate[points], reach)

@@ -1,0 +1,136 @@
+"""The rings that the edges of an aperture make around a point, and where they may end.
+
+The OTF of an obscured aperture is not smooth at the cut-off nor where the obscuration's shadow
+leaves the aperture. Each edge makes rings that fall like r^-3 only. Where they are not followed
+until they have faded, the kernel is cut smoothly behind the largest distance between a source
+and a pixel, where nobody looks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, special
+
+from ..psf import RadialPSF
+from .optics import Optics, Transfer
+
+if TYPE_CHECKING:
+    from .plan import Plan
+
+Array = NDArray[np.float64]
+
+# the cosine transform of a filter is tabulated over so many times the distance of the cut: what
+# rings beyond that leave behind is smaller than those at the cut by the 2.5th power of it
+TABLE = 16
+
+
+def first_edge(optics: Optics) -> float:
+    """Lowest frequency, cycles per pixel, at which the OTF has an edge; inf if there is none."""
+    psf = optics.psf
+    return psf.first_edge() * optics.pixel_scale if isinstance(psf, RadialPSF) else np.inf
+
+
+@dataclass(frozen=True)
+class Band:
+    """Share G_first - G_last of the frequencies that a level's kernel carries.
+
+    ``first`` -1 stands for all frequencies, ``last`` None for nothing left to coarser levels;
+    ``level`` is the mesh's, -1 for the finest.
+    """
+
+    level: int
+    first: int
+    last: int | None
+
+    def share(self, plan: Plan, k: Array) -> Array:
+        """Share at frequencies k in cycles per pixel."""
+        share = np.ones_like(k) if self.first < 0 else plan.lowpass(k, self.first)
+        return share if self.last is None else share - plan.lowpass(k, self.last)
+
+
+def band_transfer(plan: Plan, band: Band, ky: Array, kx: Array, limit: float) -> Transfer:
+    """Transfer function of a band on the grid (ky, kx), its rings cut if the plan says so.
+
+    ``limit`` is the highest frequency wanted, cycles per pixel.
+    """
+    k = np.hypot(ky[:, None], kx)
+    transfer: Transfer = plan.optics.transfer(ky, kx, limit) * band.share(plan, k)
+    if plan.cuts_rings(band.level):
+        transfer += np.interp(k, *_change(plan, band)) * plan.optics.pixel(ky, kx)
+    transfer[k > limit] = 0.0
+    return transfer
+
+
+@lru_cache(maxsize=32)
+def _change(plan: Plan, band: Band) -> tuple[Array, Array]:
+    """Frequencies, and what cutting the rings adds there to a band's radial filter.
+
+    A radial kernel ends at a radius where its projection on a line ends (Abel's transform), and
+    the filter is the cosine transform of that projection. The rings oscillate, so that a smooth
+    end of the projection changes the kernel inside by nothing that matters.
+    """
+    psf = plan.optics.psf
+    assert isinstance(psf, RadialPSF)
+    end, width = plan.ring_end(band.level), taper(plan.optics) / 6
+    step = 0.5 / (TABLE * end)
+    k = step * np.arange(fft.next_fast_len(int(plan.highest * 1.05 / step) + 2, real=True) + 1)
+    filtered = psf.otf(k / plan.optics.pixel_scale) * band.share(plan, k)
+    projection = fft.dct(filtered, type=1)
+    x = np.arange(k.size) * 0.5 / k[-1]
+    window = 0.5 * special.erfc((x - (end - 3 * width)) / width)
+    return k, fft.idct(projection * window, type=1) - filtered
+
+
+def taper(optics: Optics) -> float:
+    """Pixels over which a kernel is faded out.
+
+    The fading's own transform is exp(-39) at the lowest edge's frequency.
+    """
+    return 12.0 / first_edge(optics)
+
+
+def ring_reach(plan: Plan, level: int, start: float) -> float:
+    """Distance at which a kernel's rings are below the accuracy.
+
+    They are measured out to six times ``start``, and beyond that follow their law.
+    """
+    r, envelope = _envelope(plan.filters, level, start)
+    allowed = 0.3 * np.exp(-plan.ring_digits)
+    below = np.flatnonzero(envelope <= allowed)
+    if below.size:
+        return float(r[below[0]])
+    return float(r[-1] * (envelope[-16] / allowed) ** (1 / 3))
+
+
+@lru_cache(maxsize=64)
+def _envelope(plan: Plan, level: int, start: float) -> tuple[Array, Array]:
+    """Radii in pixels and the largest amplitude of a level's kernel beyond each.
+
+    The amplitude is over a point source's peak; the kernel is the Hankel transform of its
+    filter.
+    """
+    psf = plan.optics.psf
+    assert isinstance(psf, RadialPSF)
+    limit = plan.highest
+    r = start * np.geomspace(1.0, 6.0, 160)
+    # Gauss-Legendre on panels of less than two oscillations each
+    x, w = np.polynomial.legendre.leggauss(16)
+    panels = int(limit * r[-1]) + 8
+    k = ((np.arange(panels)[:, None] + 0.5 * (x + 1)) * (limit / panels)).ravel()
+    weight = np.tile(w, panels)
+    measure = weight * k * psf.otf(k / plan.optics.pixel_scale)
+    # for the peak, the pixel as a Gaussian of the same variance
+    peak = abs(np.sum(measure * np.exp(-(np.pi**2) * k**2 / 6)))
+    # a ring is averaged least in the direction of the pixel's sides: the envelope of sinc(k)
+    measure /= np.sqrt(1 + (np.pi * k) ** 2)
+    kernel = (
+        special.j0(2 * np.pi * np.outer(r, k))
+        @ (measure * Band(level, level, level + 1).share(plan, k))
+        / peak
+    )
+    return r, np.maximum.accumulate(np.abs(kernel)[::-1])[::-1]
