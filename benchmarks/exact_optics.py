@@ -67,7 +67,9 @@ class ExactOptics:
             edges = np.linspace(0, 1, panels + 1)
             if low == 0 and lowest:
                 halvings = int(np.log2(edges[1] * high / lowest)) // 2 + 1
-                edges = np.concatenate([[0.0], edges[1] * 2.0 ** np.arange(-halvings, 0), edges[1:]])
+                edges = np.concatenate(
+                    [[0.0], edges[1] * 2.0 ** np.arange(-halvings, 0), edges[1:]]
+                )
             t, w = gauss_panels(edges, 16)
             smooth, slope = t**2 * (3 - 2 * t), 6 * t * (1 - t)
             nodes.append(low + (high - low) * smooth)

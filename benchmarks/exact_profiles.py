@@ -6,17 +6,23 @@ In closed form; de Vaucouleurs' by its convergent series in high precision.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
-import mpmath
+import mpmath  # type: ignore[import-untyped]
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
-from scipy.special import j1
+from scipy.special import gamma, gammaincinv, j1
 
 Array = NDArray[np.float64]
 
-# range of ln k over which the series is tabulated; the transform is 1 - 1e-9 or closer below
-LOG_RANGE = (np.log(1e-8), np.log(1e3))
+# half of a de Vaucouleurs or exponential profile's light lies inside r = 1 for these
+B = float(gammaincinv(8, 0.5))
+EXPONENTIAL_B = float(gammaincinv(2, 0.5))
+# below LOWEST, cycles per half-light radius, the transform is its first two moments' to 1e-16
+LOWEST, HIGHEST = 1e-5, 100.0
+TERMS = 1600
+DIGITS = 180
 
 
 def transform(kind: str, k: Array) -> Array:
@@ -24,47 +30,52 @@ def transform(kind: str, k: Array) -> Array:
     if kind == "gaussian":
         value: Array = np.exp(-((np.pi * k) ** 2) / np.log(2))
     elif kind == "exponential":
-        value = (1 + (2 * np.pi * k / 1.6783470) ** 2) ** -1.5
+        value = (1 + (2 * np.pi * k / EXPONENTIAL_B) ** 2) ** -1.5
     elif kind == "uniform":
         x = np.maximum(2 * np.pi * np.sqrt(2) * k, 1e-12)
         value = 2 * j1(x) / x
     else:
-        value = np.asarray(_devaucouleurs()(np.log(np.maximum(k, 1e-8))), dtype=np.float64)
+        mean_square = gamma(16) / gamma(8) / B**8
+        series = _devaucouleurs()(np.log(np.maximum(k, LOWEST)))
+        value = np.where(k < LOWEST, 1 - (np.pi * k) ** 2 * mean_square, series)
     return value
 
 
 @lru_cache(maxsize=1)
 def _devaucouleurs() -> Chebyshev:
-    return Chebyshev.interpolate(
-        lambda log_k: np.array([_series(float(v)) for v in log_k]), 160, domain=LOG_RANGE
-    )
+    with mpmath.workdps(DIGITS):
+        factors = _series_factors()
+        domain = (np.log(LOWEST), np.log(HIGHEST))
+        return Chebyshev.interpolate(
+            lambda log_k: np.array([_series(float(v), factors) for v in log_k]), 160, domain=domain
+        )
 
 
-def _series(log_k: float) -> float:
+def _series(log_k: float, factors: list[Any]) -> float:
     """Hankel transform of exp(-b r^(1/4)), the exponential expanded and integrated termwise.
 
-    The transform of r^s is (2/q)^(s+2) Gamma(1+s/2) / (2 Gamma(-s/2)) in q = 2 pi k; the sum
-    over s = j/4 converges for every q > 0, with cancellation that the digits allow for.
+    The transform of r^s is 2 pi (2/q)^(s+2) Gamma(1+s/2) / (2 Gamma(-s/2)) in q = 2 pi k; the
+    sum over s = j/4 converges for every q > 0, with cancellation that the digits allow for.
     """
-    with mpmath.workdps(30):
-        z = mpmath.mpf("7.6692494") * (2 / (2 * mpmath.pi * mpmath.exp(log_k))) ** mpmath.mpf(0.25)
-    largest = max(_log_term(j, float(mpmath.log(z))) for j in range(0, 6000, 8))
-    total_digits = int(max(largest, 0) / np.log(10)) + 40
-    with mpmath.workdps(total_digits):
-        b = mpmath.mpf("7.6692494")
-        q = 2 * mpmath.pi * mpmath.exp(mpmath.mpf(log_k))
-        z = b * (2 / q) ** mpmath.mpf(0.25)
-        flux = 2 * mpmath.pi * 4 * mpmath.factorial(7) / b**8
-        total, j, power = mpmath.mpf(0), 0, mpmath.mpf(1)
-        while j < 40 or _log_term(j, float(mpmath.log(z))) > -90:
-            s = mpmath.mpf(j) / 8
-            if j % 8:  # 1 / Gamma vanishes at whole s / 2
-                total += power * mpmath.gamma(1 + s) / mpmath.gamma(-s)
-            j += 1
-            power *= -z / j
-        return float(2 * mpmath.pi * (2 / q) ** 2 / 2 * total / flux)
+    q = 2 * mpmath.pi * mpmath.exp(mpmath.mpf(log_k))
+    z = -mpmath.mpf(B) * mpmath.root(2 / q, 4)
+    flux = 2 * mpmath.pi * 4 * mpmath.factorial(7) / mpmath.mpf(B) ** 8
+    total = mpmath.mpf(0)
+    for factor in reversed(factors):
+        total = total * z + factor
+    return float(mpmath.pi * (2 / q) ** 2 * total / flux)
 
 
-def _log_term(j: int, log_z: float) -> float:
-    """Logarithm of about the size of term j."""
-    return float(j * log_z + 2 * mpmath.loggamma(1 + j / 8) - mpmath.loggamma(1 + j)) + 10
+def _series_factors() -> list[Any]:
+    """Gamma(1 + j/8) / Gamma(-j/8) / j!, by recurrence from j - 8."""
+    factors: list[Any] = []
+    for j in range(TERMS):
+        s = mpmath.mpf(j) / 8
+        if j < 8:
+            factors.append(mpmath.gamma(1 + s) * mpmath.rgamma(-s) / mpmath.factorial(j))
+        else:
+            falling = mpmath.mpf(1)
+            for i in range(8):
+                falling *= j - i
+            factors.append(factors[j - 8] * s * -s / falling)
+    return factors

@@ -34,6 +34,7 @@ def main(request: dict[str, Any], image_path: Path) -> dict[str, Any]:
 
     result: dict[str, Any] = {"import_s": perf_counter() - start}
     import numpy as np
+
     from speed_scenes import load_scene, moved
 
     module, function = MODULES[request["renderer"]]

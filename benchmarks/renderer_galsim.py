@@ -19,10 +19,10 @@ from napari_issis import Observation, TelescopePSF
 SETTINGS = {
     "default": galsim.GSParams(maximum_fft_size=32768),
     "tight": galsim.GSParams(
-        folding_threshold=5e-4,
-        maxk_threshold=1e-6,
-        kvalue_accuracy=1e-8,
-        xvalue_accuracy=1e-8,
+        folding_threshold=1e-3,
+        maxk_threshold=1e-5,
+        kvalue_accuracy=1e-7,
+        xvalue_accuracy=1e-7,
         maximum_fft_size=32768,
     ),
 }
@@ -73,7 +73,7 @@ def profiles(
 def stamps(
     observation: Observation, setting: str = "default"
 ) -> Callable[[QTable], NDArray[np.float64]]:
-    """Renderer that draws each source on a stamp of the size GalSim finds good."""
+    """Make a renderer that draws each source on a stamp of the size GalSim finds good."""
     assert isinstance(observation.psf, TelescopePSF)
     psf = galsim_psf(observation.psf, setting)
 
@@ -95,7 +95,7 @@ def stamps(
 def one_sum(
     observation: Observation, setting: str = "default"
 ) -> Callable[[QTable], NDArray[np.float64]]:
-    """Renderer that draws the sum of all sources at once."""
+    """Make a renderer that draws the sum of all sources at once."""
     assert isinstance(observation.psf, TelescopePSF)
     psf = galsim_psf(observation.psf, setting)
 

@@ -1,4 +1,4 @@
-"""This package as one of the renderers compared."""
+"""napari_issis as one of the renderers compared."""
 
 from __future__ import annotations
 
@@ -12,5 +12,5 @@ from napari_issis import Observation, count_rate
 
 
 def ours(observation: Observation, tolerance: float) -> Callable[[QTable], NDArray[np.float64]]:
-    """Renderer of one tolerance."""
+    """Make a renderer of one tolerance."""
     return lambda table: count_rate(table, observation, tolerance=tolerance)

@@ -10,15 +10,15 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 from photutils.datasets import make_model_image
 from photutils.psf import ImagePSF
-from renderer_galsim import galsim_psf
 
 from napari_issis import Observation, TelescopePSF
+from renderer_galsim import galsim_psf
 
 OVERSAMPLING = 5
 
 
 def stamps(observation: Observation, size: int) -> Callable[[QTable], NDArray[np.float64]]:
-    """Renderer with stamps of ``size`` pixels a side; the PSF image is made in advance."""
+    """Make a renderer with stamps of ``size`` pixels a side; the PSF image is made in advance."""
     assert isinstance(observation.psf, TelescopePSF)
     scale = observation.pixel_scale
     effective = galsim.Convolve(galsim_psf(observation.psf, "tight"), galsim.Pixel(scale))

@@ -13,11 +13,11 @@ import galsim
 import numpy as np
 from astropy.table import QTable
 from numpy.typing import NDArray
-from renderer_galsim import galsim_psf
 from scipy import fft
 from scipy.special import gamma
 
 from napari_issis import Observation, TelescopePSF
+from renderer_galsim import galsim_psf
 
 Array = NDArray[np.float64]
 SERSIC = {
@@ -28,7 +28,7 @@ SERSIC = {
 
 
 def pixel_grid(observation: Observation, oversampling: int = 1) -> Callable[[QTable], Array]:
-    """Renderer on a grid of ``oversampling`` points a pixel."""
+    """Make a renderer on a grid of ``oversampling`` points a pixel."""
     assert isinstance(observation.psf, TelescopePSF)
     ny, nx = (oversampling * side for side in observation.shape)
     kernel = galsim.ImageD(2 * nx, 2 * ny)
@@ -52,7 +52,7 @@ def pixel_grid(observation: Observation, oversampling: int = 1) -> Callable[[QTa
 
 
 def paint(table: QTable, observation: Observation, oversampling: int) -> Array:
-    """Sources before the PSF, cps per grid cell."""
+    """Paint the sources before the PSF, cps per grid cell."""
     ny, nx = (oversampling * side for side in observation.shape)
     frame = np.zeros((ny, nx))
     # pixel coordinates of the grid points

@@ -24,7 +24,7 @@ SCENES = (*REFERENCE_SCENES, FIELD)
 
 
 def load_scene(name: str) -> tuple[QTable, Observation]:
-    """Sources and set-up of a scene, without its reference image."""
+    """Load sources and set-up of a scene, without its reference image."""
     if name == FIELD:
         return field(10_000, 250, 2048), Observation(psf=_telescope("stars500"), shape=(2048, 2048))
     with np.load(DATA / f"{name}_telescope.npz") as data:

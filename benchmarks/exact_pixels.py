@@ -1,0 +1,142 @@
+"""Expected rate of a few pixels by quadrature that shares nothing with the package measured.
+
+Stars are integrated in real space: the PSF's radial profile over the pixel. Galaxies are
+integrated in Fourier space in polar coordinates, which knows no grid and no period.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+from astropy.table import QTable
+from numpy.typing import NDArray
+
+from exact_optics import ExactOptics
+from exact_profiles import transform
+from napari_issis import Observation, TelescopePSF
+
+Array = NDArray[np.float64]
+Pixels = NDArray[np.int64]
+
+CPS_PER_FLUX = 1.14e17
+PIXEL_SCALE = 0.036
+# frequency (cycles per pixel) below which radial panels need not go on halving
+LOWEST = 1e-7
+# nodes in one block of the polar sum
+BLOCK = 100_000
+
+
+def choose_pixels(image: Array, count: int = 20) -> Pixels:
+    """Half of them the brightest of the frame's regions, the others anywhere; (y, x) rows."""
+    rng = np.random.default_rng(5)
+    anywhere = np.column_stack([rng.integers(0, side, count // 2) for side in image.shape])
+    strips = np.array_split(np.arange(image.shape[0]), count - count // 2)
+    bright = []
+    for rows in strips:
+        y, x = np.unravel_index(image[rows].argmax(), image[rows].shape)
+        bright.append((rows[y], x))
+    return np.concatenate([np.array(bright), anywhere]).astype(np.int64)
+
+
+def exact_rates(table: QTable, observation: Observation, pixels: Pixels) -> Array:
+    """Rate of each of the pixels, cps."""
+    psf = observation.psf
+    assert isinstance(psf, TelescopePSF)
+    arcsec = 180 * 3600 / np.pi
+    optics = ExactOptics(
+        cutoff=psf.diameter / (psf.band_limits[0] * 1e-10) / arcsec * PIXEL_SCALE,
+        obscuration=psf.obscuration,
+        blur=psf.blur_fwhm / PIXEL_SCALE / np.sqrt(8 * np.log(2)),
+    )
+    is_star = np.asarray(table["kind"]) == "point"
+    rate = np.zeros(len(pixels))
+    if is_star.any():
+        rate += star_rates(table[is_star], optics, pixels)
+    if not is_star.all():
+        rate += galaxy_rates(table[~is_star], optics, pixels)
+    return rate
+
+
+def star_rates(table: QTable, optics: ExactOptics, pixels: Pixels) -> Array:
+    """Stars' PSF over each pixel by 16 x 16 Gauss points."""
+    x, w = np.polynomial.legendre.leggauss(16)
+    rates = _plain(table, "flux") * CPS_PER_FLUX
+    result = []
+    for row, column in pixels:
+        dy = row + 0.5 * x[None, :, None] - _plain(table, "y")[:, None, None]
+        dx = column + 0.5 * x[None, None, :] - _plain(table, "x")[:, None, None]
+        mean = np.einsum("sij,i,j->s", optics.psf(np.hypot(dy, dx)), 0.5 * w, 0.5 * w)
+        result.append(rates @ mean)
+    return np.array(result)
+
+
+def galaxy_rates(table: QTable, optics: ExactOptics, pixels: Pixels) -> Array:
+    """Fourier integral over rings of equally spaced angles, half a circle by symmetry."""
+    x, y = _plain(table, "x"), _plain(table, "y")
+    largest = 3 * float(_plain(table, "r_half").max())
+    corner_y = np.abs(pixels[:, :1] - y).max()
+    corner_x = np.abs(pixels[:, 1:] - x).max()
+    reach = float(np.hypot(corner_y, corner_x)) + largest
+    rate = np.zeros(len(pixels))
+    for k, weight, angle in _rings(optics, reach):
+        ky, kx = k * np.sin(angle), k * np.cos(angle)
+        spectrum = _spectrum(table, ky, kx) * weight * np.sinc(ky) * np.sinc(kx)
+        for i, (row, column) in enumerate(pixels):
+            phase = 2 * np.pi * (ky * row + kx * column)
+            rate[i] += spectrum.real @ np.cos(phase) - spectrum.imag @ np.sin(phase)
+    return rate
+
+
+def _rings(optics: ExactOptics, reach: float) -> Iterator[tuple[Array, Array, Array]]:
+    """Blocks of polar nodes: frequency, weight with the OTF, angle."""
+    radial_k, radial_w = optics.radial_nodes(cycles=1.2 * reach, lowest=LOWEST)
+    transfer = optics.transfer(radial_k)
+    keep = radial_k * transfer * radial_w > 1e-19
+    # Bessel functions J_n(z) vanish faster than any power once n is above z
+    angles = (np.pi * radial_k * reach * 1.02 + 300).astype(int)
+    block: list[tuple[Array, Array, Array]] = []
+    for k, w, f, n in zip(
+        radial_k[keep], radial_w[keep], transfer[keep], angles[keep], strict=True
+    ):
+        angle = np.pi * (np.arange(n) + 0.5) / n
+        block.append((np.full(n, k), np.full(n, 2 * np.pi * k * f * w / n), angle))
+        if sum(b[0].size for b in block) > BLOCK:
+            yield tuple(np.concatenate(parts) for parts in zip(*block, strict=True))  # type: ignore[misc]
+            block = []
+    if block:
+        yield tuple(np.concatenate(parts) for parts in zip(*block, strict=True))  # type: ignore[misc]
+
+
+def _spectrum(table: QTable, ky: Array, kx: Array) -> NDArray[np.complex128]:
+    """Sum of the sources' transforms, cps."""
+    total = np.zeros(ky.size, dtype=np.complex128)
+    rates = _plain(table, "flux") * CPS_PER_FLUX
+    radius, angle = _plain(table, "r_half"), np.radians(_plain(table, "pa"))
+    ratio = 1 - _plain(table, "ellipticity")
+    x, y = _plain(table, "x"), _plain(table, "y")
+    for i, kind in enumerate(table["kind"]):
+        along = ky * np.cos(angle[i]) - kx * np.sin(angle[i])
+        across = (ky * np.sin(angle[i]) + kx * np.cos(angle[i])) * ratio[i]
+        value = rates[i] * transform(str(kind), radius[i] * np.hypot(along, across))
+        total += value * np.exp(-2j * np.pi * (ky * y[i] + kx * x[i]))
+    return total
+
+
+def _plain(table: QTable, name: str) -> Array:
+    column = table[name]
+    return np.asarray(getattr(column, "value", column), dtype=np.float64)
+
+
+def main(scene: str, path: str) -> None:
+    """Write the pixels and rates of a scene: ``python exact_pixels.py stars500 out.npz``."""
+    from speed_scenes import load_scene, reference_image
+
+    table, observation = load_scene(scene)
+    pixels = choose_pixels(reference_image(scene))
+    np.savez(path, pixels=pixels, rates=exact_rates(table, observation, pixels))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
