@@ -63,14 +63,14 @@ class ExactOptics:
         kinks = np.array([0.0, (1 - e) / 2, e, (1 + e) / 2, 1.0]) * self.cutoff
         nodes, weights = [], []
         for low, high in zip(*(lambda s: (s[:-1], s[1:]))(np.sort(kinks)), strict=True):
-            panels = max(4, int(np.ceil((high - low) * cycles / 2)))
+            panels = max(2, int(np.ceil((high - low) * cycles / 6)))
             edges = np.linspace(0, 1, panels + 1)
             if low == 0 and lowest:
                 halvings = int(np.log2(edges[1] * high / lowest)) // 2 + 1
                 edges = np.concatenate(
                     [[0.0], edges[1] * 2.0 ** np.arange(-halvings, 0), edges[1:]]
                 )
-            t, w = gauss_panels(edges, 16)
+            t, w = gauss_panels(edges, 32)
             smooth, slope = t**2 * (3 - 2 * t), 6 * t * (1 - t)
             nodes.append(low + (high - low) * smooth)
             weights.append((high - low) * slope * w)
@@ -78,7 +78,7 @@ class ExactOptics:
 
     @cached_property
     def _radial(self) -> tuple[Array, Array]:
-        return self.radial_nodes(cycles=REACH * 1.2)
+        return self.radial_nodes(cycles=REACH * 1.1)
 
     def psf(self, r: Array) -> Array:
         """PSF at radii r below `REACH`, per square pixel, from a table of Chebyshev panels."""
