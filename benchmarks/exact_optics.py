@@ -29,12 +29,13 @@ class ExactOptics:
     """Annular aperture at one wavelength with a Gaussian blur.
 
     ``cutoff`` is diameter / wavelength in cycles per pixel, ``blur`` a standard deviation in
-    pixels.
+    pixels, ``reach`` the largest radius of `psf`.
     """
 
     cutoff: float
     obscuration: float
     blur: float
+    reach: float
 
     def transfer(self, k: Array) -> Array:
         """OTF by O'Neill (1956): the autocorrelation of the annulus."""
@@ -78,10 +79,10 @@ class ExactOptics:
 
     @cached_property
     def _radial(self) -> tuple[Array, Array]:
-        return self.radial_nodes(cycles=REACH * 1.1)
+        return self.radial_nodes(cycles=self.reach * 1.1)
 
     def psf(self, r: Array) -> Array:
-        """PSF at radii r below `REACH`, per square pixel, from a table of Chebyshev panels."""
+        """PSF at radii r up to ``reach``, per square pixel, from a table of Chebyshev panels."""
         panel = np.minimum((r / PANEL).astype(int), self._table.shape[0] - 1)
         t = 2 * (r / PANEL - panel) - 1
         coefficients = self._table[panel]
@@ -98,14 +99,13 @@ class ExactOptics:
         t = np.cos(np.pi * (np.arange(ORDER) + 0.5) / ORDER)
         inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(t, ORDER - 1))
         rows = []
-        for start in np.arange(0, REACH, PANEL):
+        for start in np.arange(0, self.reach, PANEL):
             r = start + 0.5 * PANEL * (t + 1)
             rows.append(inverse @ (j0(2 * np.pi * r[:, None] * k) @ weight))
         return np.array(rows)
 
 
-# largest radius in pixels, and size and polynomial order of the table's panels
-REACH = 736.0
+# size in pixels and polynomial order of the radial table's panels
 PANEL = 1.0
 ORDER = 20
 

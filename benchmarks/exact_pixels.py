@@ -2,12 +2,13 @@
 
 Stars are integrated in real space: the PSF's radial profile over the pixel. Galaxies are
 integrated in Fourier space in polar coordinates, which knows no grid and no period. The results
-are kept in exact_pixels.json; ``python benchmarks/exact_pixels.py`` makes them again.
+are kept in exact_pixels.json; ``python benchmarks/exact_pixels.py [scene ...]`` makes them again.
 """
 
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from exact_optics import ExactOptics
 from exact_profiles import transform
 from napari_issis import Observation, TelescopePSF
-from speed_scenes import REFERENCE_SCENES, load_scene, reference_image
+from speed_scenes import FIELD, SCENES, load_scene
 
 RESULTS = Path(__file__).parent / "exact_pixels.json"
 Array = NDArray[np.float64]
@@ -30,20 +31,20 @@ PIXEL_SCALE = 0.036
 LOWEST = 1e-7
 # transform of unit flux that is left out
 NEGLIGIBLE = 1e-18
+# groups of galaxies by distance
+GROUPS = 6
 # nodes in one block of the polar sum
 BLOCK = 100_000
 
 
-def choose_pixels(image: Array, count: int = 20) -> Pixels:
-    """Half of them the brightest of the frame's regions, the others anywhere; (y, x) rows."""
-    rng = np.random.default_rng(5)
-    anywhere = np.column_stack([rng.integers(0, side, count // 2) for side in image.shape])
-    strips = np.array_split(np.arange(image.shape[0]), count - count // 2)
-    bright = []
-    for rows in strips:
-        y, x = np.unravel_index(image[rows].argmax(), image[rows].shape)
-        bright.append((rows[y], x))
-    return np.concatenate([np.array(bright), anywhere]).astype(np.int64)
+def choose_pixels(table: QTable, corner: tuple[int, int], side: int, count: int = 20) -> Pixels:
+    """Half of them on the brightest sources of a square, the others anywhere; (y, x) rows."""
+    position = np.column_stack([_plain(table, "y"), _plain(table, "x")]) - np.array(corner)
+    inside = np.flatnonzero(np.all((position >= 0) & (position <= side - 1), axis=1))
+    brightest = inside[np.argsort(-_plain(table, "flux")[inside])][: count // 2]
+    anywhere = np.random.default_rng(5).integers(0, side, (count - brightest.size, 2))
+    pixels = np.concatenate([np.rint(position[brightest]).astype(np.int64), anywhere])
+    return np.asarray(pixels + np.array(corner), dtype=np.int64)
 
 
 def exact_rates(table: QTable, observation: Observation, pixels: Pixels) -> Array:
@@ -55,6 +56,7 @@ def exact_rates(table: QTable, observation: Observation, pixels: Pixels) -> Arra
         cutoff=psf.diameter / (psf.band_limits[0] * 1e-10) / arcsec * PIXEL_SCALE,
         obscuration=psf.obscuration,
         blur=psf.blur_fwhm / PIXEL_SCALE / np.sqrt(8 * np.log(2)),
+        reach=float(_distances(table, pixels).max()) + 1,
     )
     is_star = np.asarray(table["kind"]) == "point"
     rate = np.zeros(len(pixels))
@@ -79,12 +81,17 @@ def star_rates(table: QTable, optics: ExactOptics, pixels: Pixels) -> Array:
 
 
 def galaxy_rates(table: QTable, optics: ExactOptics, pixels: Pixels) -> Array:
-    """Fourier integral over rings of equally spaced angles, half a circle by symmetry."""
-    x, y = _plain(table, "x"), _plain(table, "y")
-    largest = 3 * float(_plain(table, "r_half").max())
-    corner_y = np.abs(pixels[:, :1] - y).max()
-    corner_x = np.abs(pixels[:, 1:] - x).max()
-    reach = float(np.hypot(corner_y, corner_x)) + largest
+    """Fourier integrals of the galaxies, the near ones apart: they need fewer nodes."""
+    distance = _distances(table, pixels) + 3 * _plain(table, "r_half")
+    rate = np.zeros(len(pixels))
+    for rows in np.array_split(np.argsort(distance), GROUPS):
+        if rows.size:
+            rate += _polar_integral(table[rows], optics, pixels, float(distance[rows].max()))
+    return rate
+
+
+def _polar_integral(table: QTable, optics: ExactOptics, pixels: Pixels, reach: float) -> Array:
+    """Sum over rings of equally spaced angles, half a circle by symmetry."""
     rate = np.zeros(len(pixels))
     for k, weight, angle in _rings(optics, reach):
         ky, kx = k * np.sin(angle), k * np.cos(angle)
@@ -93,6 +100,14 @@ def galaxy_rates(table: QTable, optics: ExactOptics, pixels: Pixels) -> Array:
             phase = 2 * np.pi * (ky * row + kx * column)
             rate[i] += spectrum.real @ np.cos(phase) - spectrum.imag @ np.sin(phase)
     return rate
+
+
+def _distances(table: QTable, pixels: Pixels) -> Array:
+    """Distance of each source from the farthest of the pixels."""
+    dy = pixels[:, :1] - _plain(table, "y")
+    dx = pixels[:, 1:] - _plain(table, "x")
+    farthest: Array = np.hypot(dy, dx).max(axis=0)
+    return farthest
 
 
 def _rings(optics: ExactOptics, reach: float) -> Iterator[tuple[Array, Array, Array]]:
@@ -138,20 +153,22 @@ def _plain(table: QTable, name: str) -> Array:
 
 
 def load_exact(scene: str) -> tuple[Pixels, Array]:
-    """Pixels (y, x) and rates kept in exact_pixels.json."""
-    kept = json.loads(RESULTS.read_text(encoding="utf-8"))[scene]
-    return np.array(kept["pixels"]), np.array(kept["rates"])
+    """Pixels (y, x) and rates kept in exact_pixels.json; none if the scene is not there."""
+    kept = json.loads(RESULTS.read_text(encoding="utf-8")).get(scene, {"pixels": [], "rates": []})
+    return np.array(kept["pixels"], dtype=np.int64).reshape(-1, 2), np.array(kept["rates"])
 
 
 def main() -> None:
-    """Integrate the pixels of every scene; minutes, and needed once."""
-    results = {}
-    for scene in REFERENCE_SCENES:
+    """Integrate the pixels of every scene; long, and needed once."""
+    results = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
+    for scene in sys.argv[1:] or SCENES:
         table, observation = load_scene(scene)
-        pixels = choose_pixels(reference_image(scene))
+        # of the large field the middle only, where the sources are nearer
+        corner, side = ((992, 992), 64) if scene == FIELD else ((0, 0), observation.shape[0])
+        pixels = choose_pixels(table, corner, side)
         rates = exact_rates(table, observation, pixels)
         results[scene] = {"pixels": pixels.tolist(), "rates": rates.tolist()}
-        RESULTS.write_text(json.dumps(results), encoding="utf-8")
+        RESULTS.write_text(json.dumps(results) + "\n", encoding="utf-8")
         print(scene, flush=True)
 
 

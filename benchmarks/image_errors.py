@@ -30,4 +30,4 @@ def image_errors(image: Array, reference: Array, sky: float) -> dict[str, float]
 
 def pixel_error(image: Array, pixels: NDArray[np.int64], rates: Array) -> float:
     """Largest error at the (y, x) pixels, cps."""
-    return float(np.abs(image[pixels[:, 0], pixels[:, 1]] - rates).max())
+    return float(np.abs(image[pixels[:, 0], pixels[:, 1]] - rates).max(initial=0.0))

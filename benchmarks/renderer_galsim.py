@@ -25,13 +25,6 @@ SETTINGS = {
         xvalue_accuracy=1e-7,
         maximum_fft_size=32768,
     ),
-    "extreme": galsim.GSParams(
-        folding_threshold=3e-4,
-        maxk_threshold=1e-7,
-        kvalue_accuracy=1e-10,
-        xvalue_accuracy=1e-10,
-        maximum_fft_size=32768,
-    ),
 }
 PROFILES: dict[str, Callable[..., galsim.GSObject]] = {
     "gaussian": galsim.Gaussian,

@@ -43,8 +43,8 @@ does so on a grid three times finer.
 * *memory*: peak of the process beyond what it took after imports.
 """
 FIELD_NOTE = """
-The reference of `field2048` is this package's image at the smallest tolerance that it accepts, so
-its own rows say how the tolerances agree, not more.
+The reference of `field2048` is this package's image at the smallest tolerance drawn; that image is
+checked by the exact quadrature at 20 pixels in the middle of the frame, all 11,000 sources counted.
 """
 
 
@@ -104,9 +104,8 @@ def _scene(rows: list[dict[str, Any]], scene: str, results: dict[str, Any]) -> l
             ]
             lines.append("| " + " | ".join(cells) + " |")
     side = "2048" if scene == "field2048" else "512"
-    lines.append(
-        f"| one pair of FFTs, padded to twice the frame | {results['floor'][side]:.2g} | | | | | | |"
-    )
+    floor = results["floor"][side]
+    lines.append(f"| one pair of FFTs, padded to twice the frame | {floor:.2g} | | | | | | |")
     imports = [row["import_s"] for row in rows if row.get("renderer") == "ours"]
     if imports:
         notes.append(f"Import of the package: {min(imports):.2g} s.")
@@ -120,16 +119,12 @@ def _cell(row: dict[str, Any], name: str, how: str) -> str:
     return format(row[name], how) if name in row else ""
 
 
-def _checks(check: dict[str, float]) -> list[str]:
-    if "reference_error" in check:
-        error = check["reference_error"]
-        return [f"Reference image against the exact pixels: {error:.1e} of the peak."]
-    if not check:
+def _checks(check: dict[str, Any]) -> list[str]:
+    if not check.get("exact_pixels"):
         return []
     return [
-        f"Against GalSim with extreme thresholds on 64 x 64 pixels, {check['sources']:.0f} sources "
-        f"within 400 pixels drawn: largest difference {check['error']:.1e} of the peak, "
-        f"{check['structure']:.1e} once a plane (the wings of the sources left out) is taken off."
+        f"Reference image against {check['exact_pixels']} pixels integrated exactly: "
+        f"{check['reference_error']:.1e} of the peak."
     ]
 
 
