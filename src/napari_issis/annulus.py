@@ -56,9 +56,10 @@ def band_averaged_otf(obscuration: float, ratio: float) -> CubicSpline:
     Gauss-Legendre after a substitution that removes the 3/2 powers at its ends.
     """
     kinks = np.array([1.0, obscuration, (1 - obscuration) / 2, (1 + obscuration) / 2])
+    kinks = kinks[kinks > 0]
     corners = np.concatenate([kinks, kinks / ratio])
     # knots crowd where the mean itself has its (weaker) kinks
-    k = np.unique(np.concatenate([np.linspace(0, 1, 6001), corners[corners > 0]]))
+    k = np.unique(np.concatenate([np.linspace(0, 1, 6001), corners]))
     x, w = np.polynomial.legendre.leggauss(20)
     s = 0.5 * (x + 1)
     smooth, slope = s**2 * (3 - 2 * s), 6 * s * (1 - s) * 0.5 * w

@@ -387,7 +387,8 @@ def _filter(plan: Plan, level: int, last: bool, shape: tuple[int, int], spread: 
     """Filter of a mesh, for what is spread on it or for what is painted as it is."""
     cell = plan.cell_size(level)
     ky, kx = fft.fftfreq(shape[0], cell), fft.rfftfreq(shape[1], cell)
-    limit = 0.5 / cell  # the mesh resolves nothing beyond
+    # spreading is not taken back beyond the band, and the mesh resolves nothing beyond 0.5
+    limit = (BAND if spread else 0.5) / cell
     rows = np.arange(shape[0])
     if plan.optics.radial:
         # even in ky: half of the rows hold everything

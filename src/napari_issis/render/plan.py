@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from .optics import Optics
-from .rings import first_edge, ring_reach, taper
+from .rings import first_edge, overshoot, ring_reach, taper
 
 Array = NDArray[np.float64]
 
 # highest frequency used on a mesh, cycles per cell (0.5 would be its Nyquist frequency)
 BAND = 0.35
 # the same for the fine mesh, whose result is only wanted at the pixels
-NEAR_BAND = 0.4
+NEAR_BAND = 0.42
 # rings are cut at multiples of this distance in pixels, so that filters are shared
 RING_STEP = 64.0
 
@@ -65,7 +65,8 @@ class Plan:
     @property
     def highest(self) -> float:
         """Frequency in cycles per pixel above which nothing passes."""
-        return _highest(self.optics, self.digits)
+        highest = _highest(self.optics, self.digits)
+        return highest if self.ring_cut == np.inf else highest + overshoot(self.optics)
 
     @property
     def near_unit(self) -> int:
@@ -137,14 +138,13 @@ class Plan:
 
     def cuts_rings(self, level: int) -> bool:
         """Whether a level's rings are cut behind the farthest pixel."""
-        end = self.ring_end(level)
-        return self._has_rings(level) and self._without_rings(level) < end < np.inf
+        return self._has_rings(level) and self.ring_cut < np.inf
 
     def ring_end(self, level: int) -> float:
         """Distance in pixels at which a level's rings have been cut."""
         cell = self.cell_size(level) if level >= 0 else 0.0
         margin = 4 * self.taps() * cell if cell > 1 else 0.0
-        return self.ring_cut + margin + taper(self.optics)
+        return max(self.ring_cut + margin, self._without_rings(level)) + taper(self.optics)
 
     def _without_rings(self, level: int) -> float:
         # the filter's edge has the transform exp(-pi^2 width^2 r^2)
@@ -153,7 +153,8 @@ class Plan:
 
     def _has_rings(self, level: int) -> bool:
         highest = BAND / self.cell_size(level) if level >= 0 else np.inf
-        return first_edge(self.optics) <= highest
+        edge = first_edge(self.optics)
+        return edge < np.inf and edge <= highest
 
 
 @lru_cache(maxsize=256)
@@ -201,6 +202,8 @@ def make_plan(
         # leave room between the meshes' band and the edge
         cell = 2.0 ** np.ceil(np.log2(BAND / (0.7 * highest)))
         return Plan(optics, digits, 0.0, max(cell, 1.0), near="stamps")
+    if ring_digits > 0 and first_edge(optics) < np.inf:
+        highest += overshoot(optics)
     if highest <= BAND:
         cell = 2.0 ** np.floor(np.log2(BAND / highest))
         return _with_rings_cut(Plan(optics, digits, ring_digits, cell, near=""), farthest)

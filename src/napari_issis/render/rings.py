@@ -78,7 +78,7 @@ def _change(plan: Plan, band: Band) -> tuple[Array, Array]:
     assert isinstance(psf, RadialPSF)
     end, width = plan.ring_end(band.level), taper(plan.optics) / 6
     step = 0.5 / (TABLE * end)
-    k = step * np.arange(fft.next_fast_len(int(plan.highest * 1.05 / step) + 2, real=True) + 1)
+    k = step * np.arange(fft.next_fast_len(int(1.05 * plan.highest / step) + 2, real=True) + 1)
     filtered = psf.otf(k / plan.optics.pixel_scale) * band.share(plan, k)
     projection = fft.dct(filtered, type=1)
     x = np.arange(k.size) * 0.5 / k[-1]
@@ -87,11 +87,19 @@ def _change(plan: Plan, band: Band) -> tuple[Array, Array]:
 
 
 def taper(optics: Optics) -> float:
-    """Pixels over which a kernel is faded out.
+    """Pixels over which a kernel is faded out by an error function a sixth as wide.
 
-    The fading's own transform is exp(-39) at the lowest edge's frequency.
+    The fading's own transform is negligible at the lowest edge's frequency.
     """
-    return 12.0 / first_edge(optics)
+    return 24.0 / first_edge(optics)
+
+
+def overshoot(optics: Optics) -> float:
+    """Frequency in cycles per pixel by which a kernel that was faded out exceeds its band.
+
+    What lies beyond is exp(-4.8) of the rings that were cut.
+    """
+    return 2.2 * 6 / (np.pi * taper(optics))
 
 
 def ring_reach(plan: Plan, level: int, start: float) -> float:
