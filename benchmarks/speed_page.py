@@ -29,9 +29,10 @@ does so on a grid three times finer.
 
 **Columns.**
 
-* *time*: median of three calls or more (one, if it takes over 20 s), each with all sources moved
-  by a thousandth of a pixel, so that no call sees a table a second time. Everything from table to
-  image is timed; what depends on the observation alone may be kept from the first call.
+* *time*: median of three calls or more (of other programs one, if it takes over 20 s), each
+  with all sources moved by a thousandth of a pixel, so that no call sees a table a second time.
+  Everything from table to image is timed; what depends on the observation alone may be kept
+  from the first call.
 * *first call*: the first one in a fresh interpreter, without imports and, for other programs,
   without the making of the PSF.
 * *error*: largest of all pixels over the image's peak; *inside*: without a border of one pixel.

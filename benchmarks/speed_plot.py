@@ -17,6 +17,13 @@ COLOURS = {
     "photutils": "tab:green",
     "pixel_grid": "tab:purple",
 }
+# where the label stands: offset in points, horizontal alignment
+LABELS = {
+    "galsim": ((0, 6), "center"),
+    "galsim_sum": ((-6, -3), "right"),
+    "photutils": ((6, -3), "left"),
+    "pixel_grid": ((0, -12), "center"),
+}
 
 
 def plot(results: dict[str, Any], path: Path) -> None:
@@ -65,19 +72,19 @@ def _panel(axis: Axes, rows: list[dict[str, Any]]) -> None:
         )
     times = [row["time_s"] for row in rows]
     if times:
-        axis.set_ylim(0.5 * min(times), 4 * max(times))
+        axis.set_ylim(0.4 * min(times), 4 * max(times))
     for row in rows:
         if row["renderer"] == "ours":
             continue
         colour = COLOURS[row["renderer"]]
         axis.plot(row["error"], row["time_s"], "s", color=colour, markersize=5)
-        left = row["error"] > 1e-3
+        offset, align = LABELS[row["renderer"]]
         axis.annotate(
             row["label"],
             (row["error"], row["time_s"]),
             textcoords="offset points",
-            xytext=(-6, 4) if left else (6, 4),
-            ha="right" if left else "left",
+            xytext=offset,
+            ha=align,
             fontsize=7.5,
             color=colour,
         )
