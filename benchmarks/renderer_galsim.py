@@ -55,9 +55,9 @@ def profiles(
     table: QTable, observation: Observation, gsparams: galsim.GSParams
 ) -> list[galsim.GSObject]:
     """Every source before the PSF, at the origin."""
-    rate = np.asarray(getattr(table["flux"], "value", table["flux"])) * observation.cps_per_flux
-    radius = np.asarray(getattr(table["r_half"], "value", table["r_half"]))
-    angle = np.asarray(getattr(table["pa"], "value", table["pa"])) + 90
+    rate = np.asarray(table["flux"].value) * observation.cps_per_flux
+    radius = np.asarray(table["r_half"].value)
+    angle = np.asarray(table["pa"].value) + 90
     objects = []
     for row, kind in enumerate(table["kind"]):
         if kind == "point":

@@ -30,7 +30,7 @@ def stamps(observation: Observation, size: int) -> Callable[[QTable], NDArray[np
     model = ImagePSF(image.array * OVERSAMPLING**2, oversampling=OVERSAMPLING)
 
     def draw(table: QTable) -> NDArray[np.float64]:
-        rate = np.asarray(getattr(table["flux"], "value", table["flux"]))
+        rate = np.asarray(table["flux"].value)
         parameters = QTable(
             {
                 "x_0": np.asarray(table["x"]),

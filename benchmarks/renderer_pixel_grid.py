@@ -58,9 +58,9 @@ def paint(table: QTable, observation: Observation, oversampling: int) -> Array:
     # pixel coordinates of the grid points
     grid_y = (np.arange(ny) + 0.5) / oversampling - 0.5
     grid_x = (np.arange(nx) + 0.5) / oversampling - 0.5
-    rate = np.asarray(getattr(table["flux"], "value", table["flux"])) * observation.cps_per_flux
-    radius = np.asarray(getattr(table["r_half"], "value", table["r_half"]))
-    angle = np.radians(np.asarray(getattr(table["pa"], "value", table["pa"])))
+    rate = np.asarray(table["flux"].value) * observation.cps_per_flux
+    radius = np.asarray(table["r_half"].value)
+    angle = np.radians(np.asarray(table["pa"].value))
     x, y = np.asarray(table["x"]), np.asarray(table["y"])
     point = np.asarray(table["kind"]) == "point"
     column = np.floor((x[point] + 0.5) * oversampling).astype(int)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import astropy.units as u
 import numpy as np
 from astropy.table import QTable, vstack
 
 from napari_issis import Observation, TelescopePSF, random_sources
 
 DATA = Path(__file__).parents[1] / "tests" / "data"
+UNITS = {"flux": u.erg / u.s / u.cm**2 / u.AA, "r_half": u.pix, "pa": u.deg}
 EXTENDED = ("exponential", "devaucouleurs", "uniform", "gaussian")
 REFERENCE_SCENES = (
     "stars500",
@@ -30,6 +32,8 @@ def load_scene(name: str) -> tuple[QTable, Observation]:
     with np.load(DATA / f"{name}_telescope.npz") as data:
         columns = ("kind", "x", "y", "flux", "r_half", "ellipticity", "pa")
         table = QTable({column: data[column] for column in columns})
+    for column, unit in UNITS.items():
+        table[column] = table[column] * unit
     return table, Observation(psf=_telescope(name), shape=(512, 512))
 
 
