@@ -18,7 +18,7 @@ settings.register_profile(
     derandomize=True,
     deadline=None,
     database=None,
-    max_examples=max(SCENES // 5, 10),
+    max_examples=max(SCENES // 6, 5),
     # a failing example names its scene's seed: a smaller seed is no simpler scene
     phases=(Phase.explicit, Phase.generate),
 )

@@ -66,6 +66,18 @@ def test_telescope(numbers, source):
     check(psf_of("telescope", numbers), source, expected, 1e-6)
 
 
+@pytest.mark.parametrize("x", [15.4, -6.2], ids=["inside", "outside"])
+@pytest.mark.parametrize(
+    "numbers", [(0.8, 0.0, 2700.0, 2700.0, 0.0), (1.2, 0.17, 2950.0, 2950.0, 0.1)]
+)
+def test_the_last_digits_of_rings(numbers, x):
+    """Catches rings cut short of the frame: one wavelength, and only the rings in the frame."""
+    star = ("point", x, *STAR[2:])
+    system = fourier_quadrature.telescope(*numbers, PIXEL)
+    expected = fourier_quadrature.rate(star, PIXELS, system)
+    check(psf_of("telescope", numbers), star, expected, 1e-8)
+
+
 def across_pixel(d, step):
     """Integral of sinc(x / step) over the unit interval about d."""
     high, low = (special.sici(np.pi * (d + e) / step)[0] for e in (0.5, -0.5))

@@ -2,18 +2,14 @@
 
 import numpy as np
 from plain_scene import CPS, PIXEL, psf_of, table_of
-from random_scene import exact_rate, own_peak, random_scene
+from random_scene import exact_rate, promised_error, random_scene
 
 import napari_issis as ni
 
 
 def test_tolerance_is_kept(scene_seed):
     """Catches a kernel cut too short, a coarse filter, a wrong bound where sources of very
-    different brightness or size meet, an aperture that is refused.
-
-    Where only wings are in the frame the documented floor holds, 1e-14 of the brightest
-    source's own peak (1e-10 for a telescope's rings).
-    """
+    different brightness or size meet, an aperture that is refused."""
     scene = random_scene(scene_seed)
     observation = ni.Observation(shape=scene.shape, psf=psf_of(*scene.psf))
     image = ni.count_rate(table_of(scene.sources), observation, tolerance=scene.tolerance)
@@ -23,6 +19,5 @@ def test_tolerance_is_kept(scene_seed):
     pixels = sorted(pixels)
     expected = CPS * exact_rate(scene, pixels, PIXEL).sum(axis=0)
     got = np.array([image[p] for p in pixels])
-    floor = 1e-10 if scene.psf[0] == "telescope" else 1e-14
-    allowed = max(scene.tolerance * image.max(), floor * CPS * own_peak(scene, PIXEL))
+    allowed = promised_error(scene, image.max(), CPS, PIXEL)
     assert np.abs(got - expected).max() <= allowed, (scene, pixels)

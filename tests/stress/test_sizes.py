@@ -29,7 +29,7 @@ def check(source, fwhm, tolerance):
 
 
 @pytest.mark.parametrize("ellipticity", [0.0, 0.999])
-@pytest.mark.parametrize("r_half", [1e-4, 0.03, 3.0, 300.0, 1e5])
+@pytest.mark.parametrize("r_half", [1e-4, 3.0, 1e5])
 @pytest.mark.parametrize("kind", EXTENDED)
 def test_corners_of_the_range(kind, r_half, ellipticity):
     """Catches a clamped radius, a needle cut into too few pieces, a lost cusp or edge."""
