@@ -71,12 +71,7 @@ def render(
         raise ValueError(
             f"tolerance is {tolerance!r}; it must lie between {SMALLEST_TOLERANCE} and 0.1."
         )
-    arrays = check_sources(
-        sources, pivot=observation.channel_data.pivot, pixel_scale=observation.pixel_scale
-    )
-    rate = arrays.flux * observation.cps_per_flux
-    bright = rate > 0
-    arrays, rate = arrays.take(bright), rate[bright]
+    arrays, rate = arrays_and_rates(sources, observation)
     if not len(arrays):
         return np.zeros(observation.shape)
     optics = Optics(observation.effective_psf, observation.pixel_scale)
@@ -97,6 +92,16 @@ def render(
         if allowed <= least or found >= 0.5 * peak:
             return image
         peak = max(min(found, 0.1 * peak), least)
+
+
+def arrays_and_rates(sources: Table, observation: Observation) -> tuple[SourceArrays, Array]:
+    """Return the sources that are not dark, and their count rates after the filters."""
+    arrays = check_sources(
+        sources, pivot=observation.channel_data.pivot, pixel_scale=observation.pixel_scale
+    )
+    rate = arrays.flux * observation.cps_per_flux
+    bright = rate > 0
+    return arrays.take(bright), rate[bright]
 
 
 def _render(

@@ -17,6 +17,7 @@ from scipy import fft
 
 from ..sources import SourceArrays
 from .discs import disc_half_sizes, paint_discs, paint_large_discs
+from .folding import fold_half, fold_last
 from .gaussians import Gaussians
 from .optics import Transfer
 from .painting import half_patch, half_patches, paint
@@ -171,34 +172,9 @@ def _filtered(mesh: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
         upper = spectrum[:, : y.modes + 1] * weight[:, : y.modes + 1]
         lower = spectrum[:, y.count - y.modes :]
         lower *= weight[:, :0:-1] if radial else weight[:, y.modes + 1 :]
-        sums = np.zeros((spectrum.shape[0], y.period), dtype=np.complex128)
-        for first in range(0, y.modes + 1, y.period):
-            part = upper[:, first : first + y.period]
-            sums[:, : part.shape[1]] += part
-        for last in range(y.modes, 0, -y.period):
-            part = lower[:, max(last - y.period, 0) : last]
-            sums[:, y.period - part.shape[1] :] += part
-        folded[:, columns] = sums.T
+        folded[:, columns] = fold_last(upper, lower, y.period).T
 
     step = min(COLUMNS, -(-(x.modes + 1) // cores()))
     for _ in in_threads(fold_columns, (slice(i, i + step) for i in range(0, x.modes + 1, step))):
         pass
-    return _fold_x(folded, x)
-
-
-def _fold_x(spectrum: Spectrum, x: Axis) -> Spectrum:
-    """Sum the aliases in x; frequencies below zero are the conjugates of those above."""
-    middle = x.period // 2
-    result = np.zeros((spectrum.shape[0], middle + 1), dtype=np.complex128)
-    for first in range(0, x.modes + 1, x.period):
-        part = spectrum[:, first : first + middle + 1]
-        result[:, : part.shape[1]] += part
-    # -kx = -j is an alias of (n + 1) period - j
-    for n in range(x.modes // x.period + 1):
-        end = (n + 1) * x.period
-        low, high = max(end - middle, 1), min(end, x.modes)
-        if low <= high:
-            part = spectrum[:, low : high + 1][:, ::-1]
-            result[0, end - high : end - low + 1] += part[0].conj()
-            result[1:, end - high : end - low + 1] += part[:0:-1].conj()
-    return result
+    return fold_half(folded, x.period)

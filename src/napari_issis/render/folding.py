@@ -1,0 +1,65 @@
+"""Spectra folded to the pixel rate: all aliases of a frequency summed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Spectrum = NDArray[np.complex128]
+
+
+def fold_last(upper: Spectrum, lower: Spectrum, period: int) -> Spectrum:
+    """Sum the aliases along the last axis.
+
+    Parameters
+    ----------
+    upper, lower : ndarray, shape (n, m + 1) and (n, m)
+        Amplitudes at the frequencies 0 ... m and -m ... -1, in units of 1 / period.
+    period : int
+        Pixels.
+
+    Returns
+    -------
+    ndarray, shape (n, period)
+        In the order of `scipy.fft.fft`.
+    """
+    sums = np.zeros((upper.shape[0], period), dtype=np.complex128)
+    for first in range(0, upper.shape[1], period):
+        part = upper[:, first : first + period]
+        sums[:, : part.shape[1]] += part
+    for last in range(lower.shape[1], 0, -period):
+        part = lower[:, max(last - period, 0) : last]
+        sums[:, period - part.shape[1] :] += part
+    return sums
+
+
+def fold_half(spectrum: Spectrum, period: int) -> Spectrum:
+    """Sum the aliases in x of a real image's spectrum.
+
+    Parameters
+    ----------
+    spectrum : ndarray, shape (ny, m + 1)
+        Amplitudes at kx = 0 ... m in units of 1 / period; those below zero are the conjugates
+        of those at -ky.
+    period : int
+        Pixels.
+
+    Returns
+    -------
+    ndarray, shape (ny, period // 2 + 1)
+        As `scipy.fft.irfft2` wants it.
+    """
+    modes, middle = spectrum.shape[1] - 1, period // 2
+    result = np.zeros((spectrum.shape[0], middle + 1), dtype=np.complex128)
+    for first in range(0, modes + 1, period):
+        part = spectrum[:, first : first + middle + 1]
+        result[:, : part.shape[1]] += part
+    # -kx = -j is an alias of (n + 1) period - j
+    for n in range(modes // period + 1):
+        end = (n + 1) * period
+        low, high = max(end - middle, 1), min(end, modes)
+        if low <= high:
+            part = spectrum[:, low : high + 1][:, ::-1]
+            result[0, end - high : end - low + 1] += part[0].conj()
+            result[1:, end - high : end - low + 1] += part[:0:-1].conj()
+    return result
