@@ -71,14 +71,18 @@ def profiles(
 
 
 def stamps(
-    observation: Observation, setting: str = "default"
+    observation: Observation, setting: str = "default", without: str = ""
 ) -> Callable[[QTable], NDArray[np.float64]]:
-    """Make a renderer that draws each source on a stamp of the size GalSim finds good."""
+    """Make a renderer that draws each source on a stamp of the size GalSim finds good.
+
+    Sources of the kind ``without`` are left out.
+    """
     assert isinstance(observation.psf, TelescopePSF)
     psf = galsim_psf(observation.psf, setting)
 
     def draw(table: QTable) -> NDArray[np.float64]:
         frame = empty_frame(observation)
+        table = table[table["kind"] != without]
         x, y = np.asarray(table["x"]), np.asarray(table["y"])
         for row, profile in enumerate(profiles(table, observation, psf.gsparams)):
             stamp = galsim.Convolve(profile, psf).drawImage(

@@ -83,7 +83,8 @@ def measure_scene(to_measure: list[Point], folder: Path) -> list[dict[str, Any]]
         path = folder / f"{point.scene}-{number}.npy"
         row = run_json("one_point.py", json.dumps(point.request()), str(path))
         row |= {"label": point.label, "renderer": point.renderer, "tolerance": point.tolerance}
-        rows.append(row if "refused" in row else row | {"image": str(path)})
+        comparable = point.whole and "refused" not in row
+        rows.append(row | {"image": str(path)} if comparable else row)
         print(point.scene, point.label, row.get("refused") or f"{row['time_s']:.3g} s", flush=True)
     return rows
 

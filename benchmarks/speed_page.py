@@ -11,7 +11,10 @@ HEAD = """# Run time against error
 
 How long it takes from a source table to an image, and how far that image is from the truth, for
 this package at several tolerances and for other programs in the same run. Made by
-`python benchmarks/run_time.py` on {date}{quick}: {machine}. Threads are each program's default.
+`python benchmarks/run_time.py` on {date}{quick}.
+
+**Machine.** {machine}.
+Threads are each program's default.
 
 ![Run time against error](pictures/speed.png)
 
@@ -44,7 +47,8 @@ does so on a grid three times finer.
 * *memory*: peak of the process beyond what it took after imports.
 """
 FIELD_NOTE = """
-The reference of `field2048` is this package's image at the smallest tolerance drawn; that image is
+*No de Vaucouleurs*: GalSim draws 250 galaxies less than this package does, since these take most of
+its time. The reference of `field2048` is this package's image at the smallest tolerance drawn; that image is
 checked by the exact quadrature at 20 pixels in the middle of the frame, all 11,000 sources counted.
 """
 
