@@ -12,6 +12,7 @@ import mpmath  # type: ignore[import-untyped]
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.special import gamma, gammaincinv, j1
 
 Array = NDArray[np.float64]
@@ -42,13 +43,16 @@ def transform(kind: str, k: Array) -> Array:
 
 
 @lru_cache(maxsize=1)
-def _devaucouleurs() -> Chebyshev:
+def _devaucouleurs() -> BSpline:
+    """Transform in ln k: Chebyshev series, and from it a quintic spline that is quicker."""
     with mpmath.workdps(DIGITS):
         factors = _series_factors()
         domain = (np.log(LOWEST), np.log(HIGHEST))
-        return Chebyshev.interpolate(
+        series = Chebyshev.interpolate(
             lambda log_k: np.array([_series(float(v), factors) for v in log_k]), 160, domain=domain
         )
+    knots = np.linspace(*domain, 6001)
+    return make_interp_spline(knots, series(knots), k=5)
 
 
 def _series(log_k: float, factors: list[Any]) -> float:
