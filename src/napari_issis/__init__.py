@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .drag import Drag
 from .exposure import Exposure, simulate
 from .image_psf import ImagePSF
 from .limits import CountRateWarning
@@ -22,6 +23,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "CountRateWarning",
+    "Drag",
     "Exposure",
     "GaussianPSF",
     "ImagePSF",

@@ -63,8 +63,11 @@ class Drag:
     ) -> None:
         self.observation = observation or Observation()
         self.tolerance = tolerance
+        chosen = np.asarray(rows, dtype=np.intp)
+        for row in chosen[(chosen < 0) | (chosen >= len(sources))]:
+            raise ValueError(f"there is no row {row}; the table has {len(sources)} rows, from 0.")
         moving = np.zeros(len(sources), dtype=bool)
-        moving[np.asarray(rows, dtype=np.intp)] = True
+        moving[chosen] = True
         if rest is None:
             rest = count_rate(sources[~moving], self.observation, tolerance=tolerance)
         self.rest = np.array(rest, dtype=np.float64)

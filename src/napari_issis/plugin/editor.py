@@ -19,7 +19,7 @@ from ..sources import (
     empty_sources,
     source,
 )
-from .picture import Drag
+from .picture import HeldSources
 from .source_layers import EllipsesLayer, Ids, PointsLayer, SourceLayer
 from .table import join, master_table
 
@@ -44,8 +44,8 @@ class SourceEditor:
         A number for each row that stays with it.
     version : int
         Goes up with each change of the table.
-    drag : Drag or None
-        The drag (or drawing) in progress.
+    held : HeldSources or None
+        What a drag (or drawing) in progress holds.
     new_source : dict
         Arguments of `napari_issis.source` for sources that are drawn by hand.
     """
@@ -57,7 +57,7 @@ class SourceEditor:
         self.sources = master_table(empty_sources())
         self.source_id: Ids = np.empty(0, dtype=np.int64)
         self.version = 0
-        self.drag: Drag | None = None
+        self.held: HeldSources | None = None
         self.pivot = 2500.0
         self.new_source: dict[str, Any] = {
             "kind": "exponential",
@@ -89,7 +89,7 @@ class SourceEditor:
 
     def replace(self, table: QTable) -> None:
         """Put a master table in the place of all sources; `write` shows it."""
-        self.drag = None
+        self.held = None
         self._born.clear()
         self.sources = table
         self.source_id = self._new_ids(len(table))
@@ -142,9 +142,9 @@ class SourceEditor:
                 moving = [int(ids[row]) for row in event.data_indices if -1 <= row < len(ids)]
             else:
                 self._adding = True
-            self.drag = Drag(self.sources, self.source_id, frozenset(moving))
+            self.held = HeldSources(self.sources, self.source_id, frozenset(moving))
         else:
-            self.drag = None
+            self.held = None
             self._untidy = True
         self._changed()
 
@@ -154,7 +154,7 @@ class SourceEditor:
             if view.layer is layer:
                 self.take_over()
                 view.layer = None
-                self.drag = None
+                self.held = None
                 self._changed()
 
     def take_over(self) -> None:
@@ -171,15 +171,15 @@ class SourceEditor:
                     self._untidy = True
             except ValueError as error:
                 show_error(str(error))
-                self.drag = None
+                self.held = None
                 self.write()
-        if self.drag is None and self._untidy:
+        if self.held is None and self._untidy:
             self._adding = self._untidy = False
             self._tidy()
 
     def _refused(self, view: SourceLayer) -> bool:
         """Remove shapes that can be no sources, unless one is being drawn just now."""
-        if self.drag is not None:
+        if self.held is not None:
             return False
         with self.quiet():
             view.layer.remove(view.foreign())

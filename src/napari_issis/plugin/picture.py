@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from astropy.table import QTable
 from numpy.typing import NDArray
 
+from ..counts import poisson_counts
+from ..drag import Drag
 from ..exposure import Exposure, expose, noise_ready_rate, same_table
 from ..limits import count_rate_warnings
 from ..observation import OPEN, Observation
@@ -16,8 +17,7 @@ from ..render import count_rate
 
 Array = NDArray[np.float64]
 
-# Largest error of the moved sources while the mouse moves, over their peak: no more than the
-# sky, and one set of filters serves the renderer for the whole drag.
+# Largest error while the mouse moves, over the image's peak: no more than the sky.
 PREVIEW_TOLERANCE = 1e-6
 
 
@@ -31,16 +31,18 @@ class Picture:
 
 
 @dataclass
-class Drag:
-    """A drag in progress: the table at its start and the sources that move.
+class HeldSources:
+    """Sources held by the mouse: the table when it was pressed, and which of them move.
 
-    ``rest`` is the rate of all others, with the observation it was rendered for.
+    ``live`` holds the count rate that follows them, with the observation it belongs to;
+    ``drawn`` the latest expected counts and counts, with the seed.
     """
 
     sources: QTable
     source_id: NDArray[np.int64]
     moving: frozenset[int]
-    rest: tuple[Any, Array] | None = field(default=None)
+    live: tuple[Observation, Drag] | None = field(default=None)
+    drawn: tuple[int, Array, NDArray[np.int64]] | None = field(default=None)
 
 
 class PictureMaker:
@@ -59,24 +61,33 @@ class PictureMaker:
 
     def preview(
         self,
-        drag: Drag,
+        held: HeldSources,
         sources: QTable,
         source_id: NDArray[np.int64],
         observation: Observation,
         seed: int,
     ) -> Picture:
-        """Make a picture in which only the moving sources are rendered anew."""
+        """Make a picture in which only the held sources are drawn anew."""
         rendered = _rendered(observation)
-        if drag.rest is None or drag.rest[0] != rendered:
-            drag.rest = (rendered, self._rest(drag, rendered))
-        moving = np.isin(source_id, drag.source_id, invert=True)
-        moving |= np.isin(source_id, list(drag.moving))
-        rate = drag.rest[1]
-        if moving.any():
-            moved = count_rate(sources[moving], rendered, tolerance=PREVIEW_TOLERANCE)
-            rate = np.maximum(rate + moved, 0.0)
-        rate = rate * observation.transmittance
-        return Picture(expose(rate, sources, observation, seed=seed), final=False)
+        if held.live is None or held.live[0] != rendered:
+            rest = self._rest(held, rendered)
+            held.live = (
+                rendered,
+                Drag(sources[:0], rendered, tolerance=PREVIEW_TOLERANCE, rest=rest),
+            )
+        live = held.live[1]
+        moving = np.isin(source_id, held.source_id, invert=True)
+        moving |= np.isin(source_id, list(held.moving))
+        live.move(sources[moving])
+        expected = np.maximum(live.rate, 0.0) * observation.transmittance
+        expected = (expected + observation.sky_rate) * observation.exposure
+        previous = None
+        if held.drawn is not None and held.drawn[0] == seed:
+            previous = held.drawn[1:]
+        counts = poisson_counts(expected, seed, previous=previous)
+        held.drawn = (seed, expected, counts)
+        table = QTable(sources, copy=True)
+        return Picture(Exposure(counts, expected, table, observation, seed), final=False)
 
     def _rate(self, sources: QTable, observation: Observation) -> tuple[Array, float]:
         rendered = _rendered(observation)
@@ -94,17 +105,17 @@ class PictureMaker:
             and same_table(self._kept[0], sources)
         )
 
-    def _rest(self, drag: Drag, rendered: Observation) -> Array:
+    def _rest(self, held: HeldSources, rendered: Observation) -> Array:
         """Rate of the sources that do not move: the whole less the others, if it is known."""
-        moving = np.isin(drag.source_id, list(drag.moving))
-        if self._keeps(drag.sources, rendered):
-            whole, _ = self._rate(drag.sources, rendered)
+        moving = np.isin(held.source_id, list(held.moving))
+        if self._keeps(held.sources, rendered):
+            whole, _ = self._rate(held.sources, rendered)
             if not moving.any():
                 return whole
             if 2 * moving.sum() <= moving.size:
-                part = count_rate(drag.sources[moving], rendered, tolerance=PREVIEW_TOLERANCE)
+                part = count_rate(held.sources[moving], rendered, tolerance=PREVIEW_TOLERANCE)
                 return np.maximum(whole - part, 0.0)
-        return noise_ready_rate(drag.sources[~moving], rendered)[0]
+        return noise_ready_rate(held.sources[~moving], rendered)[0]
 
 
 def _rendered(observation: Observation) -> Observation:

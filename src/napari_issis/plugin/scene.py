@@ -23,7 +23,7 @@ from .editor import SourceEditor
 from .latest_wins import LatestWins
 from .marks import MARKER
 from .picking import activate_source_under
-from .picture import Drag, Picture, PictureMaker
+from .picture import HeldSources, Picture, PictureMaker
 from .table import master_table
 
 # The live scene of each viewer, kept alive by the viewer's mouse callbacks.
@@ -311,15 +311,15 @@ class Scene:
         """Bring table and picture in step with what the user did; cheap if nothing changed."""
         self._timer.stop()
         self.editor.take_over()
-        drag = self.editor.drag
+        held = self.editor.held
         if not self.layers:
             self._jobs.drop()
-        elif drag is None:
+        elif held is None:
             self._pause.stop()
             self._request_final()
         elif self._requested[0] != self._version:
             self._pause.stop()
-            self._request_preview(drag)
+            self._request_preview(held)
 
     def _request_final(self) -> None:
         ticket = (self._version, True)
@@ -336,7 +336,7 @@ class Scene:
 
         self._jobs.request(job)
 
-    def _request_preview(self, drag: Drag) -> None:
+    def _request_preview(self, held: HeldSources) -> None:
         ticket = (self._version, False)
         self._requested, self._error = ticket, None
         maker, editor = self._maker, self.editor
@@ -344,7 +344,7 @@ class Scene:
         observation, seed = self._observation, self._seed
 
         def job() -> tuple[Any, Picture]:
-            return ticket, maker.preview(drag, sources, source_id, observation, seed)
+            return ticket, maker.preview(held, sources, source_id, observation, seed)
 
         self._jobs.request(job)
 
