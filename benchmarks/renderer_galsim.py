@@ -70,6 +70,13 @@ def profiles(
     return objects
 
 
+def convolved(profile: galsim.GSObject, psf: galsim.GSObject) -> galsim.GSObject:
+    """Convolve with the PSF; of a star the PSF itself is drawn, which is quicker."""
+    if isinstance(profile, galsim.DeltaFunction):
+        return psf.withFlux(profile.flux)
+    return galsim.Convolve(profile, psf)
+
+
 def stamps(
     observation: Observation, setting: str = "default", without: str = ""
 ) -> Callable[[QTable], NDArray[np.float64]]:
@@ -85,7 +92,7 @@ def stamps(
         table = table[table["kind"] != without]
         x, y = np.asarray(table["x"]), np.asarray(table["y"])
         for row, profile in enumerate(profiles(table, observation, psf.gsparams)):
-            stamp = galsim.Convolve(profile, psf).drawImage(
+            stamp = convolved(profile, psf).drawImage(
                 center=galsim.PositionD(x[row], y[row]), scale=observation.pixel_scale, dtype=float
             )
             overlap = stamp.bounds & frame.bounds

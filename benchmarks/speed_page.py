@@ -47,8 +47,8 @@ does so on a grid three times finer.
 * *memory*: peak of the process beyond what it took after imports.
 """
 FIELD_NOTE = """
-*No de Vaucouleurs*: GalSim draws 250 galaxies less than this package does, since these take most of
-its time.
+*No de Vaucouleurs*: GalSim draws 250 galaxies less than this package does, those that it is slowest
+with.
 
 The reference of `field2048` is this package's image at the smallest tolerance drawn; that image is
 checked by the exact quadrature at 20 pixels in the middle of the frame, all 11,000 sources counted.
