@@ -8,6 +8,7 @@ from scipy import fft, special
 
 from ..sources import SourceArrays
 from .profiles import disc_transform
+from .threads import in_threads
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,12 @@ def elliptical_frequency(
     sin, cos = np.sin(np.radians(pa)), np.cos(np.radians(pa))
     along = (ky * cos)[:, None] - (kx * sin)[None, :]
     across = (ky * sin)[:, None] + (kx * cos)[None, :]
-    q: Array = 2 * np.pi * r_half * np.hypot(along, (1 - ellipticity) * across)
+    along *= along
+    across *= across
+    across *= (1 - ellipticity) ** 2
+    along += across
+    q: Array = np.sqrt(along, out=along)
+    q *= 2 * np.pi * r_half
     return q
 
 
@@ -42,24 +48,38 @@ def paint_discs(
     rate: Array,
     spread: float,
     cut: float,
+    limit: float,
 ) -> None:
     """Add uniform ellipses, widened by a Gaussian, to a mesh of densities.
 
-    Parameters are those of `painting.paint`; ``rate`` holds the ellipses' count rates.
+    Parameters are those of `painting.paint`; ``rate`` holds the ellipses' count rates, and
+    frequencies above ``limit`` cycles per pixel are left out.
     """
     half_y, half_x = disc_half_sizes(discs)
-    for i in range(len(discs)):
+
+    def patch(i: int) -> tuple[slice, slice, Array]:
         n_y, first_y = _patch(discs.y[i], half_y[i] + cut * spread, start[0], cell)
         n_x, first_x = _patch(discs.x[i], half_x[i] + cut * spread, start[1], cell)
-        ky, kx = fft.fftfreq(n_y, cell), fft.rfftfreq(n_x, cell)
+        most_y, most_x = (int(min(limit * n * cell, (n - 1) // 2)) for n in (n_y, n_x))
+        ky = np.concatenate([np.arange(most_y + 1), np.arange(-most_y, 0)]) / (n_y * cell)
+        kx = np.arange(most_x + 1) / (n_x * cell)
         q = elliptical_frequency(ky, kx, discs.r_half[i], discs.ellipticity[i], discs.pa[i])
         offset_y = discs.y[i] - start[0] - first_y * cell
         offset_x = discs.x[i] - start[1] - first_x * cell
         factor_y = np.exp(-2j * np.pi * ky * offset_y - 2 * (np.pi * spread * ky) ** 2)
         factor_x = np.exp(-2j * np.pi * kx * offset_x - 2 * (np.pi * spread * kx) ** 2)
-        spectrum = disc_transform(q) * factor_y[:, None] * factor_x
-        patch = fft.irfft2(spectrum, (n_y, n_x)) * (rate[i] / cell**2)
-        mesh[first_y : first_y + n_y, first_x : first_x + n_x] += patch
+        factor_y *= rate[i] / cell**2
+        kept = disc_transform(q) * factor_y[:, None]
+        kept *= factor_x
+        spectrum = np.zeros((n_y, n_x // 2 + 1), dtype=np.complex128)
+        spectrum[: most_y + 1, : most_x + 1] = kept[: most_y + 1]
+        if most_y:
+            spectrum[-most_y:, : most_x + 1] = kept[most_y + 1 :]
+        values = fft.irfft2(spectrum, (n_y, n_x), overwrite_x=True)
+        return slice(first_y, first_y + n_y), slice(first_x, first_x + n_x), values
+
+    for rows, columns, values in in_threads(patch, range(len(discs))):
+        mesh[rows, columns] += values
 
 
 def paint_large_discs(

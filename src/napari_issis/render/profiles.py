@@ -12,7 +12,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
-from scipy.interpolate import CubicSpline
+
+from .lookup import Lookup
 
 Array = NDArray[np.float64]
 
@@ -152,7 +153,7 @@ def sersic_transform(n: float, q: Array) -> Array:
     else:
         with np.errstate(divide="ignore"):
             log_q = np.log(q)
-        value = np.exp(_log_transform(n)(np.clip(log_q, *LOG_Q_RANGE)))
+        value = np.exp(_log_transform(n)(log_q))
     return value
 
 
@@ -161,13 +162,17 @@ LOG_Q_RANGE = (-23.0, 18.5)
 
 
 @lru_cache(maxsize=512)
-def _log_transform(n: float) -> CubicSpline:
+def _log_transform(n: float) -> Lookup:
     """Logarithm of the transform of the Sersic profile of index n, summed from its Gaussians."""
     gaussians = sersic_gaussians(n, 30.0)
-    log_q = np.linspace(*LOG_Q_RANGE, 4000)
-    exponent = -0.5 * np.exp(2 * log_q)[:, None] * gaussians.sigma**2
-    value = np.exp(np.maximum(exponent, -700.0)) @ gaussians.fraction
-    return CubicSpline(log_q, np.log(np.maximum(value, 1e-300)))
+
+    def logarithm(log_q: Array) -> Array:
+        exponent = -0.5 * np.exp(2 * log_q)[:, None] * gaussians.sigma**2
+        value = np.exp(np.maximum(exponent, -700.0)) @ gaussians.fraction
+        log: Array = np.log(np.maximum(value, 1e-300))
+        return log
+
+    return Lookup(logarithm, *LOG_Q_RANGE, 4000)
 
 
 def disc_envelope(q: Array) -> Array:
@@ -176,8 +181,25 @@ def disc_envelope(q: Array) -> Array:
     return bound
 
 
+# arguments up to which the disc's transform is tabulated
+LARGEST_Z = 400.0
+
+
 def disc_transform(q: Array) -> Array:
     """2 J1(z) / z, z = sqrt(2) q: transform of the uniform disc of half-light radius 1."""
     z = np.sqrt(2) * q
+    value = _disc_table()(z)
+    beyond = z > LARGEST_Z
+    if beyond.any():
+        value[beyond] = _disc_value(z[beyond])
+    return value
+
+
+@lru_cache(maxsize=1)
+def _disc_table() -> Lookup:
+    return Lookup(_disc_value, 0.0, LARGEST_Z, 100_000)
+
+
+def _disc_value(z: Array) -> Array:
     value: Array = np.where(z > 1e-9, 2 * special.j1(z) / np.where(z > 1e-9, z, 1.0), 1.0)
     return value
