@@ -222,9 +222,14 @@ class TelescopePSF(RadialPSF):
         return self.diameter / (self.band_limits[0] * 1e-10) / ARCSEC_PER_RADIAN
 
     def first_edge(self) -> float:
-        """Where the overlap of the two rims begins: (1 - obscuration) / 2 of the cut-off."""
+        """Where the rims' overlap begins or the obscuration's with itself ends.
+
+        (1 - obscuration) / 2 or the obscuration, in units of the longest wavelength's cut-off.
+        """
         cutoff = self.diameter / (self.band_limits[1] * 1e-10) / ARCSEC_PER_RADIAN
-        return cutoff if self.obscuration == 0 else 0.5 * (1 - self.obscuration) * cutoff
+        if self.obscuration == 0:
+            return cutoff
+        return min(0.5 * (1 - self.obscuration), self.obscuration) * cutoff
 
     def otf(self, k: ArrayLike) -> Array:
         """Annular OTF, averaged over the band, times the blur's."""

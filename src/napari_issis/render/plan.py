@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from .optics import Optics
-from .rings import first_edge, overshoot, ring_reach, taper
+from .rings import fading, first_edge, ring_amplitude, ring_reach
 
 Array = NDArray[np.float64]
 
@@ -53,6 +53,9 @@ class Plan:
         What carries the frequencies above that mesh's band: nothing, a fine mesh or stamps.
     ring_cut : float
         Distance in pixels behind which rings may be cut; inf where they are followed.
+    ring_fade : float
+        Argument of the error function with which the cut begins and ends: what it changes is
+        exp(-ring_fade^2) of the rings there.
     """
 
     optics: Optics
@@ -61,12 +64,15 @@ class Plan:
     cell: float
     near: str
     ring_cut: float = np.inf
+    ring_fade: float = 0.0
 
     @property
     def highest(self) -> float:
         """Frequency in cycles per pixel above which nothing passes."""
         highest = _highest(self.optics, self.digits)
-        return highest if self.ring_cut == np.inf else highest + overshoot(self.optics)
+        if self.ring_cut < np.inf:
+            highest += self.ring_fade / (np.pi * fading(self.optics))
+        return highest
 
     @property
     def near_unit(self) -> int:
@@ -144,7 +150,8 @@ class Plan:
         """Distance in pixels at which a level's rings have been cut."""
         cell = self.cell_size(level) if level >= 0 else 0.0
         margin = 4 * self.taps() * cell if cell > 1 else 0.0
-        return max(self.ring_cut + margin, self._without_rings(level)) + taper(self.optics)
+        begin = max(self.ring_cut + margin, self._without_rings(level))
+        return begin + 2 * self.ring_fade * fading(self.optics)
 
     def _without_rings(self, level: int) -> float:
         # the filter's edge has the transform exp(-pi^2 width^2 r^2)
@@ -202,11 +209,14 @@ def make_plan(
         # leave room between the meshes' band and the edge
         cell = 2.0 ** np.ceil(np.log2(BAND / (0.7 * highest)))
         return Plan(optics, digits, 0.0, max(cell, 1.0), near="stamps")
-    if ring_digits > 0 and first_edge(optics) < np.inf:
-        highest += overshoot(optics)
     if highest <= BAND:
         cell = 2.0 ** np.floor(np.log2(BAND / highest))
-        return _with_rings_cut(Plan(optics, digits, ring_digits, cell, near=""), farthest)
+        wide = _with_rings_cut(Plan(optics, digits, ring_digits, cell, near=""), farthest)
+        if wide.highest <= BAND / cell:
+            return wide
+        if cell > 1:
+            wide = Plan(optics, digits, ring_digits, cell / 2, near="")
+            return _with_rings_cut(wide, farthest)
     mesh = _with_rings_cut(Plan(optics, digits, ring_digits, 1.0, near="mesh"), farthest)
     stamps = replace(mesh, near="stamps")
     if meshes_only or _mesh_seconds(mesh, shape, points) < _stamp_seconds(stamps, points, extended):
@@ -217,10 +227,14 @@ def make_plan(
 def _with_rings_cut(plan: Plan, farthest: float) -> Plan:
     """Cut the rings of a plan if they reach further than needed."""
     cut = RING_STEP * float(np.ceil(farthest / RING_STEP))
-    first = -1 if plan.near else 0
-    if all(plan.reach(level) <= cut for level in range(first, 3) if plan._has_rings(level)):
+    levels = [j for j in range(-1 if plan.near else 0, 3) if plan._has_rings(j)]
+    if all(plan.reach(j) <= cut for j in levels):
         return plan
-    return replace(plan, ring_cut=cut)
+    amplitude = max(ring_amplitude(plan, j, plan._without_rings(j), cut) for j in levels)
+    # what is lost of rings at a distance r is sqrt(k r) times as high in their centre
+    amplitude *= 10 * np.pi * np.sqrt(plan.highest * cut)
+    fade = np.sqrt(max(np.log(amplitude) + plan.ring_digits, 2.0))
+    return replace(plan, ring_cut=cut, ring_fade=0.5 * float(np.ceil(2 * fade)))
 
 
 @lru_cache(maxsize=256)

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 # the cosine transform of a filter is tabulated over so many times the distance of the cut: what
 # rings beyond that leave behind is smaller than those at the cut by the 2.5th power of it
-TABLE = 16
+TABLE = 256
 
 
 def first_edge(optics: Optics) -> float:
@@ -76,30 +76,22 @@ def _change(plan: Plan, band: Band) -> tuple[Array, Array]:
     """
     psf = plan.optics.psf
     assert isinstance(psf, RadialPSF)
-    end, width = plan.ring_end(band.level), taper(plan.optics) / 6
+    end, width = plan.ring_end(band.level), fading(plan.optics)
     step = 0.5 / (TABLE * end)
     k = step * np.arange(fft.next_fast_len(int(1.05 * plan.highest / step) + 2, real=True) + 1)
     filtered = psf.otf(k / plan.optics.pixel_scale) * band.share(plan, k)
     projection = fft.dct(filtered, type=1)
     x = np.arange(k.size) * 0.5 / k[-1]
-    window = 0.5 * special.erfc((x - (end - 3 * width)) / width)
+    window = 0.5 * special.erfc((x - end) / width + plan.ring_fade)
     return k, fft.idct(projection * window, type=1) - filtered
 
 
-def taper(optics: Optics) -> float:
-    """Pixels over which a kernel is faded out by an error function a sixth as wide.
+def fading(optics: Optics) -> float:
+    """Width in pixels of the error function with which a kernel is faded out.
 
-    The fading's own transform is negligible at the lowest edge's frequency.
+    Its transform is negligible at the lowest edge's frequency.
     """
-    return 24.0 / first_edge(optics)
-
-
-def overshoot(optics: Optics) -> float:
-    """Frequency in cycles per pixel by which a kernel that was faded out exceeds its band.
-
-    What lies beyond is exp(-4.8) of the rings that were cut.
-    """
-    return 2.2 * 6 / (np.pi * taper(optics))
+    return 6.0 / first_edge(optics)
 
 
 def ring_reach(plan: Plan, level: int, start: float) -> float:
@@ -113,6 +105,14 @@ def ring_reach(plan: Plan, level: int, start: float) -> float:
     if below.size:
         return float(r[below[0]])
     return float(r[-1] * (envelope[-16] / allowed) ** (1 / 3))
+
+
+def ring_amplitude(plan: Plan, level: int, start: float, distance: float) -> float:
+    """Largest amplitude of a kernel's rings beyond a distance, over a point source's peak."""
+    r, envelope = _envelope(plan.filters, level, start)
+    if distance > r[-1]:
+        return float(envelope[-16] * (r[-1] / distance) ** 3)
+    return float(envelope[np.searchsorted(r, distance)])
 
 
 @lru_cache(maxsize=64)
