@@ -98,12 +98,14 @@ def _scene(rows: list[dict[str, Any]], scene: str, results: dict[str, Any]) -> l
             lines.append(f"| {row['label']} | refused | | | | | | |")
             notes.append(f"{row['label']}: {row['refused']}")
         else:
-            star = "*" if row.get("sampled") else ""
+            mark = "*" if row.get("sampled") else ""
+            if row["tolerance"] and row.get("error", 0.0) > row["tolerance"]:
+                mark += " above tolerance"
             cells = [
                 row["label"],
                 f"{row['time_s']:.3g}",
                 f"{row['first_s']:.3g}",
-                _cell(row, "error", ".1e") + star,
+                _cell(row, "error", ".1e") + mark,
                 _cell(row, "error_inside", ".1e"),
                 _cell(row, "flux_error", "+.0e"),
                 _cell(row, "poisson_error", ".1g"),
