@@ -48,33 +48,25 @@ def paint_discs(
     rate: Array,
     spread: float,
     cut: float,
-    limit: float,
 ) -> None:
     """Add uniform ellipses, widened by a Gaussian, to a mesh of densities.
 
-    Parameters are those of `painting.paint`; ``rate`` holds the ellipses' count rates, and
-    frequencies above ``limit`` cycles per pixel are left out.
+    Parameters are those of `painting.paint`; ``rate`` holds the ellipses' count rates.
     """
     half_y, half_x = disc_half_sizes(discs)
 
     def patch(i: int) -> tuple[slice, slice, Array]:
         n_y, first_y = _patch(discs.y[i], half_y[i] + cut * spread, start[0], cell)
         n_x, first_x = _patch(discs.x[i], half_x[i] + cut * spread, start[1], cell)
-        most_y, most_x = (int(min(limit * n * cell, (n - 1) // 2)) for n in (n_y, n_x))
-        ky = np.concatenate([np.arange(most_y + 1), np.arange(-most_y, 0)]) / (n_y * cell)
-        kx = np.arange(most_x + 1) / (n_x * cell)
+        ky, kx = fft.fftfreq(n_y, cell), fft.rfftfreq(n_x, cell)
         q = elliptical_frequency(ky, kx, discs.r_half[i], discs.ellipticity[i], discs.pa[i])
         offset_y = discs.y[i] - start[0] - first_y * cell
         offset_x = discs.x[i] - start[1] - first_x * cell
         factor_y = np.exp(-2j * np.pi * ky * offset_y - 2 * (np.pi * spread * ky) ** 2)
         factor_x = np.exp(-2j * np.pi * kx * offset_x - 2 * (np.pi * spread * kx) ** 2)
         factor_y *= rate[i] / cell**2
-        kept = disc_transform(q) * factor_y[:, None]
-        kept *= factor_x
-        spectrum = np.zeros((n_y, n_x // 2 + 1), dtype=np.complex128)
-        spectrum[: most_y + 1, : most_x + 1] = kept[: most_y + 1]
-        if most_y:
-            spectrum[-most_y:, : most_x + 1] = kept[most_y + 1 :]
+        spectrum = disc_transform(q) * factor_y[:, None]
+        spectrum *= factor_x
         values = fft.irfft2(spectrum, (n_y, n_x), overwrite_x=True)
         return slice(first_y, first_y + n_y), slice(first_x, first_x + n_x), values
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from .optics import Optics
-from .rings import fading, first_edge, ring_amplitude, ring_reach
+from .rings import fading, first_edge, ring_fade, ring_reach
 
 Array = NDArray[np.float64]
 
@@ -146,12 +146,15 @@ class Plan:
         """Whether a level's rings are cut behind the farthest pixel."""
         return self._has_rings(level) and self.ring_cut < np.inf
 
-    def ring_end(self, level: int) -> float:
-        """Distance in pixels at which a level's rings have been cut."""
+    def ring_begin(self, level: int) -> float:
+        """Distance in pixels at which the cut of a level's rings begins."""
         cell = self.cell_size(level) if level >= 0 else 0.0
         margin = 4 * self.taps() * cell if cell > 1 else 0.0
-        begin = max(self.ring_cut + margin, self._without_rings(level))
-        return begin + 2 * self.ring_fade * fading(self.optics)
+        return max(self.ring_cut + margin, self._without_rings(level))
+
+    def ring_end(self, level: int) -> float:
+        """Distance in pixels at which a level's rings have been cut."""
+        return self.ring_begin(level) + 2 * self.ring_fade * fading(self.optics)
 
     def _without_rings(self, level: int) -> float:
         # the filter's edge has the transform exp(-pi^2 width^2 r^2)
@@ -228,13 +231,11 @@ def _with_rings_cut(plan: Plan, farthest: float) -> Plan:
     """Cut the rings of a plan if they reach further than needed."""
     cut = RING_STEP * float(np.ceil(farthest / RING_STEP))
     levels = [j for j in range(-1 if plan.near else 0, 3) if plan._has_rings(j)]
-    if all(plan.reach(j) <= cut for j in levels):
+    if all(_ring_reach(plan, j) <= max(cut, plan._without_rings(j)) for j in levels):
         return plan
-    amplitude = max(ring_amplitude(plan, j, plan._without_rings(j), cut) for j in levels)
-    # what is lost of rings at a distance r is sqrt(k r) times as high in their centre
-    amplitude *= 10 * np.pi * np.sqrt(plan.highest * cut)
-    fade = np.sqrt(max(np.log(amplitude) + plan.ring_digits, 2.0))
-    return replace(plan, ring_cut=cut, ring_fade=0.5 * float(np.ceil(2 * fade)))
+    plan = replace(plan, ring_cut=cut)
+    fade = max(ring_fade(plan, j, plan._without_rings(j), plan.ring_begin(j)) for j in levels)
+    return replace(plan, ring_fade=0.5 * float(np.ceil(2 * max(fade, 1.0))))
 
 
 @lru_cache(maxsize=256)

@@ -107,12 +107,22 @@ def ring_reach(plan: Plan, level: int, start: float) -> float:
     return float(r[-1] * (envelope[-16] / allowed) ** (1 / 3))
 
 
-def ring_amplitude(plan: Plan, level: int, start: float, distance: float) -> float:
-    """Largest amplitude of a kernel's rings beyond a distance, over a point source's peak."""
+def ring_fade(plan: Plan, level: int, start: float, begin: float) -> float:
+    """Argument of the error function with which a level's fading must begin at a distance.
+
+    At every smaller distance, too, the fading must change less of the kernel than the accuracy
+    allows; within ``start`` it may be as high as the peak.
+    """
     r, envelope = _envelope(plan.filters, level, start)
-    if distance > r[-1]:
-        return float(envelope[-16] * (r[-1] / distance) ** 3)
-    return float(envelope[np.searchsorted(r, distance)])
+    if begin > r[-1]:
+        r = np.append(r, begin)
+        envelope = np.append(envelope, envelope[-16] * (r[-2] / begin) ** 3)
+    inside = r <= begin
+    r, envelope = np.append(r[inside], start), np.append(envelope[inside], 1.0)
+    # what is lost of rings at a distance r is sqrt(k r) times as high in their centre
+    lost = 10 * np.pi * np.sqrt(plan.highest * begin) * envelope
+    needed = np.sqrt(np.maximum(np.log(lost) + plan.ring_digits, 0.0))
+    return float(np.max(needed - (begin - r) / fading(plan.optics)))
 
 
 @lru_cache(maxsize=64)
