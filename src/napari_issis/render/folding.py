@@ -8,29 +8,27 @@ from numpy.typing import NDArray
 Spectrum = NDArray[np.complex128]
 
 
-def fold_last(upper: Spectrum, lower: Spectrum, period: int) -> Spectrum:
-    """Sum the aliases along the last axis.
+def fold_rows(upper: Spectrum, lower: Spectrum, period: int, out: Spectrum) -> None:
+    """Sum the aliases along the first axis.
 
     Parameters
     ----------
-    upper, lower : ndarray, shape (n, m + 1) and (n, m)
+    upper, lower : ndarray, shape (m + 1, n) and (m, n)
         Amplitudes at the frequencies 0 ... m and -m ... -1, in units of 1 / period.
     period : int
         Pixels.
-
-    Returns
-    -------
-    ndarray, shape (n, period)
-        In the order of `scipy.fft.fft`.
+    out : ndarray, shape (period, n)
+        Where the sums go, in the order of `scipy.fft.fft`.
     """
-    sums = np.zeros((upper.shape[0], period), dtype=np.complex128)
-    for first in range(0, upper.shape[1], period):
-        part = upper[:, first : first + period]
-        sums[:, : part.shape[1]] += part
-    for last in range(lower.shape[1], 0, -period):
-        part = lower[:, max(last - period, 0) : last]
-        sums[:, period - part.shape[1] :] += part
-    return sums
+    first = min(period, upper.shape[0])
+    out[:first] = upper[:first]
+    out[first:] = 0.0
+    for start in range(period, upper.shape[0], period):
+        part = upper[start : start + period]
+        out[: part.shape[0]] += part
+    for last in range(lower.shape[0], 0, -period):
+        part = lower[max(last - period, 0) : last]
+        out[period - part.shape[0] :] += part
 
 
 def fold_half(spectrum: Spectrum, period: int) -> Spectrum:

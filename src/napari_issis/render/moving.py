@@ -16,7 +16,7 @@ from ..psf import RadialPSF
 from ..sources import SourceArrays
 from .direct import has_sharp_edge
 from .discs import disc_half_sizes
-from .folding import fold_half, fold_last
+from .folding import fold_half, fold_rows
 from .optics import Optics
 from .profiles import disc_envelope, sersic_transform, sersic_value
 from .stamps import transform
@@ -58,16 +58,17 @@ class MovingSource:
         spectrum = optics.transfer(self.ky, self.kx) * rate
         if one.kind[0] != "point":
             spectrum *= transform(one, self.ky, self.kx)
-        self.spectrum = spectrum.T
+        self.spectrum = spectrum
 
     def place(self, y: float, x: float) -> tuple[int, int, Array]:
         """Image of the source at (y, x), and the row and column of its first pixel."""
         row, column = round(y) - self.half[0], round(x) - self.half[1]
-        turned = self.spectrum * np.exp(-2j * np.pi * self.ky * (y - row))
-        turned *= np.exp(-2j * np.pi * self.kx * (x - column))[:, None]
+        turned = self.spectrum * np.exp(-2j * np.pi * self.ky * (y - row))[:, None]
+        turned *= np.exp(-2j * np.pi * self.kx * (x - column))
         upper = self.ky.size // 2 + 1
-        folded = fold_last(turned[:, :upper], turned[:, upper:], self.period[0])
-        image = fft.irfft2(fold_half(folded.T, self.period[1]), self.period)
+        folded = np.empty((self.period[0], self.kx.size), dtype=np.complex128)
+        fold_rows(turned[:upper], turned[upper:], self.period[0], folded)
+        image = fft.irfft2(fold_half(folded, self.period[1]), self.period)
         return row, column, image[: 2 * self.half[0] + 1, : 2 * self.half[1] + 1]
 
 

@@ -17,7 +17,7 @@ from scipy import fft
 
 from ..sources import SourceArrays
 from .discs import disc_half_sizes, paint_discs, paint_large_discs
-from .folding import fold_half, fold_last
+from .folding import fold_half, fold_rows
 from .gaussians import Gaussians
 from .optics import Transfer
 from .painting import half_patch, half_patches, paint
@@ -167,12 +167,12 @@ def _filtered(mesh: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
     folded = np.empty((y.period, x.modes + 1), dtype=np.complex128)
 
     def fold_columns(columns: slice) -> None:
-        spectrum = fft.fft(np.ascontiguousarray(half[:, columns].T), axis=1, overwrite_x=True)
-        weight = filtered[:, columns].T
-        upper = spectrum[:, : y.modes + 1] * weight[:, : y.modes + 1]
-        lower = spectrum[:, y.count - y.modes :]
-        lower *= weight[:, :0:-1] if radial else weight[:, y.modes + 1 :]
-        folded[:, columns] = fold_last(upper, lower, y.period).T
+        spectrum = fft.fft(half[:, columns], axis=0)
+        weight = filtered[:, columns]
+        upper, lower = spectrum[: y.modes + 1], spectrum[y.count - y.modes :]
+        upper *= weight[: y.modes + 1]
+        lower *= weight[:0:-1] if radial else weight[y.modes + 1 :]
+        fold_rows(upper, lower, y.period, folded[:, columns])
 
     step = min(COLUMNS, -(-(x.modes + 1) // cores()))
     for _ in in_threads(fold_columns, (slice(i, i + step) for i in range(0, x.modes + 1, step))):
