@@ -107,8 +107,8 @@ def simulate(
         the same pixel, whatever the scene.
     tolerance : float, optional
         Largest error of any pixel's rate over the image's peak, as for `count_rate`. By
-        default 1e-6, tightened until the error is below 1 % of the sky in every pixel, but
-        not below 1e-10; 1e-8 without a sky.
+        default that of `accuracy_for_counts`: the error is at most 1e-6 of the peak and 1 %
+        of the sky in every pixel, but not asked to be below 1e-12 of the peak.
 
     Returns
     -------
@@ -136,18 +136,31 @@ def noise_ready_rate(
     neutral filters scale the rate at open-open and render nothing.
     """
     transmittance = observation.transmittance
-    observation = observation.replace(filters=OPEN)
+    absolute = None
     if tolerance is None:
-        sky = observation.sky_rate
-        rate = (
-            render(sources, observation, tolerance=1e-6, absolute=0.01 * sky, floor=1e-10)
-            if sky > 0
-            else render(sources, observation, tolerance=1e-8)
-        )
-    else:
-        rate = render(sources, observation, tolerance=tolerance)
+        tolerance, absolute = accuracy_for_counts(observation)
+    rate = render(
+        sources, observation.replace(filters=OPEN), tolerance=tolerance, absolute=absolute
+    )
     lowest = float(rate.min(initial=0.0))
     return np.maximum(rate, 0.0) * transmittance, abs(min(lowest, 0.0)) * transmittance
+
+
+def accuracy_for_counts(observation: Observation) -> tuple[float, float | None]:
+    """Error of the rate at open-open with which counts may be drawn.
+
+    Returns
+    -------
+    tolerance : float
+        Largest error over the image's peak: 1e-6, and 1e-8 without a sky.
+    absolute : float or None
+        Largest error in cps per pixel: 1 % of the sky, rounded down to a power of ten, so that
+        skies that differ a little share a render.
+    """
+    sky = observation.replace(filters=OPEN).sky_rate
+    if sky <= 0:
+        return 1e-8, None
+    return 1e-6, float(10.0 ** np.floor(np.log10(0.01 * sky)))
 
 
 def expose(

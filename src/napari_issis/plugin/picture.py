@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from ..counts import poisson_counts
 from ..drag import Drag
-from ..exposure import Exposure, expose, noise_ready_rate, same_table
+from ..exposure import Exposure, accuracy_for_counts, expose, noise_ready_rate, same_table
 from ..limits import count_rate_warnings
 from ..observation import OPEN, Observation
 from ..render import count_rate
 
 Array = NDArray[np.float64]
+# what a rate depends on, beside the sources
+Rendered = tuple[Observation, tuple[float, float | None]]
 
 # Largest error while the mouse moves, over the image's peak: no more than the sky.
 PREVIEW_TOLERANCE = 1e-6
@@ -41,7 +43,7 @@ class HeldSources:
     sources: QTable
     source_id: NDArray[np.int64]
     moving: frozenset[int]
-    live: tuple[Observation, Drag] | None = field(default=None)
+    live: tuple[Rendered, Drag] | None = field(default=None)
     drawn: tuple[int, Array, NDArray[np.int64]] | None = field(default=None)
 
 
@@ -49,7 +51,7 @@ class PictureMaker:
     """Makes pictures, and keeps the last rate so that a new exposure time renders nothing."""
 
     def __init__(self) -> None:
-        self._kept: tuple[QTable, Observation, Array, float] | None = None
+        self._kept: tuple[QTable, Rendered, Array, float] | None = None
 
     def final(self, sources: QTable, observation: Observation, seed: int) -> Picture:
         """Make the exposure that `napari_issis.simulate` makes of the same scene."""
@@ -70,11 +72,9 @@ class PictureMaker:
         """Make a picture in which only the held sources are drawn anew."""
         rendered = _rendered(observation)
         if held.live is None or held.live[0] != rendered:
-            rest = self._rest(held, rendered)
-            held.live = (
-                rendered,
-                Drag(sources[:0], rendered, tolerance=PREVIEW_TOLERANCE, rest=rest),
-            )
+            rest = self._rest(held, observation)
+            drag = Drag(sources[:0], rendered[0], tolerance=PREVIEW_TOLERANCE, rest=rest)
+            held.live = (rendered, drag)
         live = held.live[1]
         moving = np.isin(source_id, held.source_id, invert=True)
         moving |= np.isin(source_id, list(held.moving))
@@ -92,32 +92,37 @@ class PictureMaker:
     def _rate(self, sources: QTable, observation: Observation) -> tuple[Array, float]:
         rendered = _rendered(observation)
         if not self._keeps(sources, rendered):
-            rate, clipped = noise_ready_rate(sources, rendered)
+            rate, clipped = noise_ready_rate(sources, observation.replace(filters=OPEN))
             self._kept = (sources, rendered, rate, clipped)
         assert self._kept is not None
         _, _, rate, clipped = self._kept
         return rate * observation.transmittance, clipped * observation.transmittance
 
-    def _keeps(self, sources: QTable, rendered: Observation) -> bool:
+    def _keeps(self, sources: QTable, rendered: Rendered) -> bool:
         return (
             self._kept is not None
             and self._kept[1] == rendered
             and same_table(self._kept[0], sources)
         )
 
-    def _rest(self, held: HeldSources, rendered: Observation) -> Array:
+    def _rest(self, held: HeldSources, observation: Observation) -> Array:
         """Rate of the sources that do not move: the whole less the others, if it is known."""
+        observation = observation.replace(filters=OPEN)
         moving = np.isin(held.source_id, list(held.moving))
-        if self._keeps(held.sources, rendered):
-            whole, _ = self._rate(held.sources, rendered)
+        if self._keeps(held.sources, _rendered(observation)):
+            whole, _ = self._rate(held.sources, observation)
             if not moving.any():
                 return whole
             if 2 * moving.sum() <= moving.size:
-                part = count_rate(held.sources[moving], rendered, tolerance=PREVIEW_TOLERANCE)
+                part = count_rate(held.sources[moving], observation, tolerance=PREVIEW_TOLERANCE)
                 return np.maximum(whole - part, 0.0)
-        return noise_ready_rate(held.sources[~moving], rendered)[0]
+        return noise_ready_rate(held.sources[~moving], observation)[0]
 
 
-def _rendered(observation: Observation) -> Observation:
-    """Return the observation less what needs no rendering: at open-open, for one second."""
-    return observation.replace(filters=OPEN, exposure=1.0, pointing=None, roll=0.0)
+def _rendered(observation: Observation) -> Rendered:
+    """Return the observation less what needs no rendering, and the accuracy it asks for.
+
+    Rates are kept at open-open, for one second and without a sky.
+    """
+    bare = observation.replace(filters=OPEN, exposure=1.0, background=0.0, pointing=None, roll=0.0)
+    return bare, accuracy_for_counts(observation)

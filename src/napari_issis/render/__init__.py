@@ -39,7 +39,7 @@ def count_rate(
     tolerance : float
         Largest error of any pixel over the image's largest pixel, 1e-12 to 0.1. Where only
         the wings of sources are in the frame, the error is not below 1e-14 of the brightest
-        source's own peak (1e-10 for the diffraction rings of a `TelescopePSF`).
+        source's own peak.
 
     Returns
     -------
@@ -61,11 +61,10 @@ def render(
     *,
     tolerance: float,
     absolute: float | None = None,
-    floor: float = SMALLEST_TOLERANCE,
 ) -> Array:
     """`count_rate` with a second demand: the error is also at most ``absolute`` cps per pixel.
 
-    The tolerance is tightened for that as far as ``floor``.
+    The tolerance is tightened for that as far as 1e-12.
     """
     if not isinstance(tolerance, float | int) or not SMALLEST_TOLERANCE <= tolerance <= 0.1:
         raise ValueError(
@@ -85,7 +84,7 @@ def render(
     while True:
         allowed = tolerance * peak
         if absolute is not None:
-            allowed = min(allowed, max(absolute, floor * peak))
+            allowed = min(allowed, max(absolute, SMALLEST_TOLERANCE * peak))
         allowed = max(allowed, least)
         image = _render(optics, observation.shape, arrays, rate, allowed, own_peak)
         found = float(image.max())
