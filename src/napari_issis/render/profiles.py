@@ -197,7 +197,7 @@ def disc_transform(q: Array) -> Array:
 
 @lru_cache(maxsize=1)
 def _disc_table() -> Lookup:
-    return Lookup(_disc_value, 0.0, LARGEST_Z, 100_000)
+    return Lookup(_disc_value, 0.0, LARGEST_Z, 250_000)
 
 
 def _disc_value(z: Array) -> Array:
