@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from .optics import Transfer
 from .painting import half_patch, half_patches, paint
 from .plan import BAND, Plan, spread_cut
 from .rings import Band, band_transfer
+from .threads import alongside
 
 # Uniform ellipses wider than this, in pixels, are painted on every mesh as far as they lie on it,
 # instead of once and whole.
@@ -116,6 +118,11 @@ def mesh_rate(
     top = max(int(level_of.max(initial=0)), int(disc_level.max(initial=0)))
     while _wings(plan, top, shape, total) > 0.03 * allowed or plan.cuts_rings(top):
         top += 1
+    near_image: Callable[[], Array] | None = None
+    close = _outside(shape, discs.y, discs.x, disc_half_sizes(discs)) <= plan.reach(-1)
+    if plan.near == "mesh" and (near.any() or close.any() or len(large)):
+        sharp = (gaussians.take(near), digits[near], discs.take(close), disc_rate[close])
+        near_image = alongside(partial(near_rate, plan, shape, *sharp, large, large_rate))
     results: list[Array | None] = []
     passed: Density | None = None
     for level, frame in enumerate(spans(plan, shape, top + 1)):
@@ -144,11 +151,8 @@ def mesh_rate(
         results.append(mesh.rate(here))
         passed = None if onward is None else mesh.pass_on(onward)
     image = add_up(plan, results, shape)
-    if plan.near == "mesh":
-        close = _outside(shape, discs.y, discs.x, disc_half_sizes(discs)) <= plan.reach(-1)
-        sharp = (gaussians.take(near), digits[near], discs.take(close), disc_rate[close])
-        if near.any() or close.any() or len(large):
-            image += near_rate(plan, shape, *sharp, large, large_rate)
+    if near_image is not None:
+        image += near_image()
     return image
 
 

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
+from threading import Thread
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -23,6 +24,22 @@ def cores() -> int:
 @lru_cache(maxsize=1)
 def _pool(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(cores(), thread_name_prefix="napari-issis")
+
+
+def alongside(work: Callable[[], Result]) -> Callable[[], Result]:
+    """Begin some work in another thread; the function returned waits for its result."""
+    if cores() == 1:
+        return work
+    future: Future[Result] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(work())
+        except BaseException as error:
+            future.set_exception(error)
+
+    Thread(target=run, name="napari-issis", daemon=True).start()
+    return future.result
 
 
 def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
