@@ -38,10 +38,11 @@ class Lookup:
         at = np.clip(x, self.low, self.high)
         at -= self.low
         at *= self.scale
-        index = np.minimum(at.astype(np.intp), self.coefficients[0].size - 1)
+        index = at.astype(np.intp)
+        np.minimum(index, self.coefficients[0].size - 1, out=index)
         at -= index
-        value: Array = self.coefficients[0].take(index)
+        value: Array = self.coefficients[0].take(index, mode="clip")
         for coefficient in self.coefficients[1:]:
             value *= at
-            value += coefficient.take(index)
+            value += coefficient.take(index, mode="clip")
         return value

@@ -305,7 +305,9 @@ class _Mesh:
         if len(spread) or len(discs) or passed is not None:
             self.low_mesh = np.zeros(self.shape)
             paint(self.low_mesh, start, self.cell, spread, sigma, cut_spread)
-            paint_discs(self.low_mesh, start, self.cell, discs, content.disc_rate, sigma, cut)
+            paint_discs(
+                self.low_mesh, start, self.cell, discs, content.disc_rate, sigma, plan.digits
+            )
             if passed is not None:
                 y, x = (round((passed.intervals[a][0] - start[a]) / self.cell) for a in (0, 1))
                 rows, columns = passed.values.shape

@@ -96,7 +96,7 @@ def near_rate(
     mesh = np.zeros((y.count, x.count))
     start, cell, spread = (float(y.start), float(x.start)), plan.near_cell, plan.near_spread()
     paint(mesh, start, cell, gaussians, spread, cut)
-    paint_discs(mesh, start, cell, discs, disc_rate, spread, plan.cut())
+    paint_discs(mesh, start, cell, discs, disc_rate, spread, plan.digits)
     if len(large):
         paint_large_discs(mesh, start, cell, large, large_rate, spread, plan.digits)
     spectrum = _filtered(mesh, y, x, _filter(plan.filters, y.period, x.period))
