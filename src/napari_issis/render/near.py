@@ -8,6 +8,7 @@ inverted at that rate only.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -23,15 +24,16 @@ from .optics import Transfer
 from .painting import half_patch, half_patches, paint
 from .plan import Plan, spread_cut
 from .rings import Band, band_transfer
-from .threads import cores, in_threads
+from .threads import in_threads
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 
-# points of the mesh, some 2 GB of memory in all
-LARGEST_MESH = 1.3e8
-# columns transformed at a time
-COLUMNS = 32
+# points of the mesh, some 5 GB of memory in all
+LARGEST_MESH = 5e8
+# rows and columns transformed at a time
+ROWS = 64
+COLUMNS = 48
 
 
 @dataclass(frozen=True)
@@ -93,17 +95,19 @@ def near_rate(
             "diffraction rings reach far; choose a larger tolerance, a smaller frame or a PSF "
             "averaged over a band."
         )
-    mesh = np.zeros((y.count, x.count))
+    # room for the transform of each row in its own place
+    rows = np.zeros((y.count, 2 * (x.count // 2 + 1)))
+    mesh = rows[:, : x.count]
     start, cell, spread = (float(y.start), float(x.start)), plan.near_cell, plan.near_spread()
     paint(mesh, start, cell, gaussians, spread, cut)
     paint_discs(mesh, start, cell, discs, disc_rate, spread, plan.digits)
     if len(large):
         paint_large_discs(mesh, start, cell, large, large_rate, spread, plan.digits)
-    spectrum = _filtered(mesh, y, x, _filter(plan.filters, y.period, x.period))
-    del mesh
+    spectrum = _filtered(rows, y, x, _filter(plan.filters, y.period, x.period))
+    del mesh, rows
     values = fft.irfft2(spectrum, (y.period, x.period), workers=-1, overwrite_x=True)
-    rows, columns = -y.start + np.arange(shape[0]), -x.start + np.arange(shape[1])
-    wanted: Array = values[np.ix_(rows % y.period, columns % x.period)]
+    in_y, in_x = np.arange(shape[0]) - y.start, np.arange(shape[1]) - x.start
+    wanted: Array = values[np.ix_(in_y % y.period, in_x % x.period)]
     return wanted
 
 
@@ -160,9 +164,18 @@ def high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
     return band_transfer(plan, Band(-1, -1, 0), ky, kx, limit)
 
 
-def _filtered(mesh: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
-    """Half-spectrum at the pixel rate of a mesh, filtered, all aliases summed."""
-    half = fft.rfft(mesh, axis=1, workers=-1)[:, : x.modes + 1]
+def _filtered(rows: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
+    """Half-spectrum at the pixel rate of a mesh, filtered, all aliases summed.
+
+    ``rows`` holds the mesh in its first columns and is overwritten.
+    """
+    half = rows.view(np.complex128)
+
+    def transform_rows(block: slice) -> None:
+        half[block] = fft.rfft(rows[block, : x.count], axis=1)
+
+    for _ in in_threads(transform_rows, _blocks(y.count, ROWS)):
+        pass
     radial = filtered.shape[0] == y.modes + 1
     folded = np.empty((y.period, x.modes + 1), dtype=np.complex128)
 
@@ -174,7 +187,10 @@ def _filtered(mesh: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
         lower *= weight[:0:-1] if radial else weight[y.modes + 1 :]
         fold_rows(upper, lower, y.period, folded[:, columns])
 
-    step = min(COLUMNS, -(-(x.modes + 1) // cores()))
-    for _ in in_threads(fold_columns, (slice(i, i + step) for i in range(0, x.modes + 1, step))):
+    for _ in in_threads(fold_columns, _blocks(x.modes + 1, COLUMNS)):
         pass
     return fold_half(folded, x.period)
+
+
+def _blocks(count: int, size: int) -> Iterator[slice]:
+    return (slice(first, min(first + size, count)) for first in range(0, count, size))
