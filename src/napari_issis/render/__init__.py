@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 # tolerances accepted; below, rounding of the transforms is larger
 SMALLEST_TOLERANCE = 1e-12
+# side in pixels of the squares in which neighbours are counted
+NEIGHBOURHOOD = 128.0
 # half-light radius in pixels above which a uniform ellipse gets no stamp of its own
 LARGEST_STAMP = 300.0
 
@@ -121,7 +123,7 @@ def _render(
         optics,
         shape,
         allowed / brightest,
-        allowed / max(_ring_amplitude(optics, sources, rate), 1e-300),
+        _ring_accuracy(optics, sources, rate, allowed),
         _farthest(sources, shape),
         int(is_point.sum()),
         int((~is_point).sum()),
@@ -145,20 +147,30 @@ def _render(
     return image
 
 
-def _ring_amplitude(optics: Optics, sources: SourceArrays, rate: Array) -> float:
-    """Peak of the point source whose diffraction rings are as strong as the scene's strongest."""
+def _ring_accuracy(optics: Optics, sources: SourceArrays, rate: Array, allowed: float) -> float:
+    """Error allowed in the diffraction rings over the peak of the source that has the strongest.
+
+    Rings of neighbours add up at random: the number of equally strong ones that are about as
+    far away is taken from the fullest of the squares into which the field is divided.
+    """
     psf = optics.psf
     if not isinstance(psf, RadialPSF) or psf.first_edge() == np.inf:
-        return 0.0
+        return np.inf
     ratio = 1 - sources.ellipticity
     q = 2 * np.pi * sources.r_half * ratio * psf.first_edge() * optics.pixel_scale
-    sharp = np.ones_like(rate)
+    strength = rate.copy()
     disc = sources.kind == "uniform"
-    sharp[disc] = disc_envelope(q[disc])
+    strength[disc] *= disc_envelope(q[disc])
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
         chosen = sources.index == n
-        sharp[chosen] = sersic_transform(float(n), q[chosen])
-    return float((rate * sharp).max()) / optics.point_area
+        strength[chosen] *= sersic_transform(float(n), q[chosen])
+    strongest = float(strength.max())
+    if strongest <= 0:
+        return np.inf
+    square = np.stack([sources.y, sources.x]) // NEIGHBOURHOOD
+    _, which = np.unique(square, axis=1, return_inverse=True)
+    neighbours = float(np.bincount(which.ravel(), (strength / strongest) ** 2).max())
+    return float(allowed * optics.point_area / (strongest * 3 * (1 + np.sqrt(neighbours))))
 
 
 def _farthest(sources: SourceArrays, shape: tuple[int, int]) -> float:

@@ -56,7 +56,7 @@ def paint_discs(
     """
     cut = float(spread_cut(digits))
     # taking back the spreading amplifies errors at high frequencies by up to exp(0.75 digits)
-    accuracy = 3e3 * np.exp(-1.75 * digits)
+    accuracy = min(3e3 * np.exp(-1.75 * digits), 0.02 * np.exp(-digits))
     half_y, half_x = disc_half_sizes(discs)
 
     for i in range(len(discs)):

@@ -194,7 +194,7 @@ def make_plan(
     accuracy : float
         Error allowed over the brightest source's peak.
     ring_accuracy : float
-        Error allowed over the amplitude of the sharpest source's rings.
+        Error allowed in the rings over the peak of the source that has the strongest.
     farthest : float
         Largest distance in pixels between a pixel and a source whose rings matter.
     points, extended : int
@@ -206,7 +206,7 @@ def make_plan(
     """
     # a third of the error allowed, in half steps so that plans are shared
     digits = float(np.ceil(2 * np.log(3 / max(accuracy, 1e-15))) / 2)
-    ring_digits = max(float(np.ceil(2 * np.log(10 / max(ring_accuracy, 1e-15))) / 2), 0.0)
+    ring_digits = max(float(np.ceil(-2 * np.log(max(ring_accuracy, 1e-15))) / 2), 0.0)
     highest = _highest(optics, digits)
     if sharp_edge:
         # leave room between the meshes' band and the edge

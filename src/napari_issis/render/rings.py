@@ -100,7 +100,7 @@ def ring_reach(plan: Plan, level: int, start: float) -> float:
     They are measured out to six times ``start``, and beyond that follow their law.
     """
     r, envelope = _envelope(plan.filters, level, start)
-    allowed = 0.3 * np.exp(-plan.ring_digits)
+    allowed = np.exp(-plan.ring_digits)
     below = np.flatnonzero(envelope <= allowed)
     if below.size:
         return float(r[below[0]])
