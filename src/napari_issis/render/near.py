@@ -152,9 +152,11 @@ def _filter(plan: Plan, period_y: int, period_x: int) -> Transfer:
     ky, kx = (np.arange(int(plan.highest * p) + 1) / p for p in (period_y, period_x))
     if not plan.optics.radial:
         ky = np.concatenate([ky, -ky[:0:-1]])
-    filtered = high_pass(plan, ky, kx)
-    filtered *= cell**2 * np.exp(2 * (np.pi * spread * ky) ** 2)[:, None]
-    filtered *= np.exp(2 * (np.pi * spread * kx) ** 2)
+    filtered = np.empty((ky.size, kx.size), dtype=np.float64 if plan.optics.radial else complex)
+    for block in _blocks(ky.size, ROWS):  # temporary arrays stay small
+        filtered[block] = high_pass(plan, ky[block], kx)
+        filtered[block] *= cell**2 * np.exp(2 * (np.pi * spread * ky[block]) ** 2)[:, None]
+        filtered[block] *= np.exp(2 * (np.pi * spread * kx) ** 2)
     return filtered
 
 
