@@ -309,7 +309,7 @@ def test_tighter_for_the_sky():
     star = ni.source("point", 30.2, 30.7, 1e-14)
     observation = ni.Observation(shape=(64, 64))
     exact = ni.count_rate(star, observation, tolerance=1e-11)
-    tight = render(star, observation, tolerance=1e-2, absolute=3.5e-6, floor=1e-10)
+    tight = render(star, observation, tolerance=1e-2, absolute=3.5e-6)
     assert np.abs(tight - exact).max() <= 3.5e-6
 
 
