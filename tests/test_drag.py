@@ -103,6 +103,14 @@ def test_a_move_renders_nothing_else(monkeypatch):
         drag.move(ni.source("exponential", 33.3, 44.4, 1e-15, r_half=2.0))
 
 
+def test_what_is_negligible_is_left_out():
+    table = scene("exponential")
+    drag = ni.Drag(table, OBSERVATION, [30], negligible=1e-3)
+    expected = ni.count_rate(table, OBSERVATION, tolerance=1e-7)
+    error = np.abs(drag.rate - expected).max()
+    assert 1e-5 * expected.max() < error <= 1e-3
+
+
 def test_many_sources_are_rendered_together():
     table = scene("gaussian")
     drag = ni.Drag(table, OBSERVATION, np.arange(30))

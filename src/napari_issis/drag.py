@@ -37,6 +37,8 @@ class Drag:
         Rows of the sources that will move.
     tolerance : float
         Largest error of any pixel over the image's largest pixel.
+    negligible : float
+        Error in cps per pixel that may be made even if it is above the tolerance.
     rest : ndarray, shape (ny, nx), optional
         Count rate of the other sources, where it is known; it is rendered if not given.
 
@@ -59,10 +61,12 @@ class Drag:
         rows: Sequence[int] | NDArray[np.intp] = (),
         *,
         tolerance: float = 1e-5,
+        negligible: float = 0.0,
         rest: ArrayLike | None = None,
     ) -> None:
         self.observation = observation or Observation()
         self.tolerance = tolerance
+        self.negligible = negligible
         chosen = np.asarray(rows, dtype=np.intp)
         for row in chosen[(chosen < 0) | (chosen >= len(sources))]:
             raise ValueError(f"there is no row {row}; the table has {len(sources)} rows, from 0.")
@@ -104,7 +108,7 @@ class Drag:
         if not rates.size:
             return windows
         own = peaks(self._optics, arrays, rates)
-        allowed = self.tolerance * max(self._peak, float(own.max()))
+        allowed = max(self.tolerance * max(self._peak, float(own.max())), self.negligible)
         if len(arrays) > MOST_SOURCES:
             self._render(moved)
             return [_whole(self.observation.shape)]

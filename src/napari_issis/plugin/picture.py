@@ -13,7 +13,6 @@ from ..drag import Drag
 from ..exposure import Exposure, accuracy_for_counts, expose, noise_ready_rate, same_table
 from ..limits import count_rate_warnings
 from ..observation import OPEN, Observation
-from ..render import count_rate
 
 Array = NDArray[np.float64]
 # what a rate depends on, beside the sources
@@ -21,6 +20,8 @@ Rendered = tuple[Observation, tuple[float, float | None]]
 
 # Largest error while the mouse moves, over the image's peak: no more than the sky.
 PREVIEW_TOLERANCE = 1e-6
+# share of the sky that the error may have anyway
+PREVIEW_SHARE = 0.05
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,7 @@ class PictureMaker:
         """Make a picture in which only the held sources are drawn anew."""
         rendered = _rendered(observation)
         if held.live is None or held.live[0] != rendered:
-            rest = self._rest(held, observation)
-            drag = Drag(sources[:0], rendered[0], tolerance=PREVIEW_TOLERANCE, rest=rest)
+            drag = self._live(held.sources[:0], observation, self._rest(held, observation))
             held.live = (rendered, drag)
         live = held.live[1]
         moving = np.isin(source_id, held.source_id, invert=True)
@@ -114,9 +114,21 @@ class PictureMaker:
             if not moving.any():
                 return whole
             if 2 * moving.sum() <= moving.size:
-                part = count_rate(held.sources[moving], observation, tolerance=PREVIEW_TOLERANCE)
-                return np.maximum(whole - part, 0.0)
+                part = self._live(held.sources[moving], observation, np.zeros(whole.shape))
+                return np.maximum(whole - part.rate, 0.0)
         return noise_ready_rate(held.sources[~moving], observation)[0]
+
+    def _live(self, moving: QTable, observation: Observation, rest: Array) -> Drag:
+        """Put sources that move on the rate of the others."""
+        bare, _ = _rendered(observation)
+        return Drag(
+            moving,
+            bare,
+            range(len(moving)),
+            tolerance=PREVIEW_TOLERANCE,
+            negligible=PREVIEW_SHARE * observation.replace(filters=OPEN).sky_rate,
+            rest=rest,
+        )
 
 
 def _rendered(observation: Observation) -> Rendered:

@@ -28,8 +28,8 @@ MOST_MODES = 4_000_000
 # share of the light allowed to be missing that each of three omissions may take: beyond the
 # window, above the highest frequency, and wrapped around
 SHARE = 0.4
-# radii in pixels at which a PSF is looked at
-RADII = np.concatenate([np.arange(0.0, 8.0, 0.25), np.geomspace(8.0, 4000.0, 400)])
+# radii in pixels at which a PSF is looked at; beyond, no PSF falls more slowly than r^-2
+RADII = np.concatenate([np.arange(0.0, 8.0, 0.5), np.geomspace(8.0, 400.0, 100)])
 
 
 class MovingSource:
@@ -87,8 +87,8 @@ def can_move(
 def _half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> tuple[int, int]:
     """Half-sizes (y, x) of a window, outside of which the light is below ``share``.
 
-    Light arrives there either from the source's outskirts, not brighter than these, or by the
-    PSF's wings from its inner part.
+    Light arrives there from the source's outskirts and, by the PSF's wings, from its inner
+    part. Either falls steeply, so that the distances where they fade add like squares.
     """
     wing = _wing(optics, share / rate)
     if one.kind[0] == "point":
@@ -103,15 +103,20 @@ def _half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) ->
     major = r_half * float(r[bright].max(initial=0.0))
     half_y = np.hypot(major * np.cos(pa), ratio * major * np.sin(pa))
     half_x = np.hypot(major * np.sin(pa), ratio * major * np.cos(pa))
-    return int(half_y + wing) + 2, int(half_x + wing) + 2
+    return int(np.hypot(half_y, wing)) + 2, int(np.hypot(half_x, wing)) + 2
 
 
 def _wing(optics: Optics, level: float) -> float:
     """Distance in pixels beyond which a point source of unit rate stays below a level."""
     if not isinstance(optics.psf, RadialPSF):
         return optics.extent + 50.0
-    above = np.flatnonzero(_envelope(optics) > level)
-    return float(RADII[min(above[-1] + 1, RADII.size - 1)]) if above.size else 0.0
+    envelope = _envelope(optics)
+    above = np.flatnonzero(envelope > level)
+    if not above.size:
+        return 0.0
+    if above[-1] + 1 < RADII.size:
+        return float(RADII[above[-1] + 1])
+    return float(RADII[-1] * np.sqrt(envelope[-1] / level))
 
 
 @lru_cache(maxsize=16)
@@ -126,9 +131,7 @@ def _envelope(optics: Optics) -> Array:
     # the pixel as it acts along its own axis, averaged least
     measure = np.pi * (limit / panels) * np.tile(w, panels) * k
     measure *= psf.otf(k / optics.pixel_scale) / np.sqrt(1 + (np.pi * k) ** 2)
-    brightness = np.concatenate(
-        [special.j0(2 * np.pi * np.outer(r, k)) @ measure for r in np.array_split(RADII, 8)]
-    )
+    brightness = special.j0(2 * np.pi * np.outer(RADII, k)) @ measure
     return np.maximum.accumulate(np.abs(brightness)[::-1])[::-1]
 
 
