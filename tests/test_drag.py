@@ -105,10 +105,10 @@ def test_a_move_renders_nothing_else(monkeypatch):
 
 def test_what_is_negligible_is_left_out():
     table = scene("exponential")
-    drag = ni.Drag(table, OBSERVATION, [30], negligible=1e-3)
+    drag = ni.Drag(table, OBSERVATION, [30], negligible=0.1)
     expected = ni.count_rate(table, OBSERVATION, tolerance=1e-7)
     error = np.abs(drag.rate - expected).max()
-    assert 1e-5 * expected.max() < error <= 1e-3
+    assert 1e-5 * expected.max() < error <= 0.1
 
 
 def test_many_sources_are_rendered_together():

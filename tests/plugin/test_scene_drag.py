@@ -7,9 +7,8 @@ import pytest
 from astropy.table import vstack
 from small_scene import SMALL, few_sources
 
-from napari_issis import simulate, source
+from napari_issis import render, simulate, source
 from napari_issis.exposure import same_table
-from napari_issis import render
 from napari_issis.plugin import picture
 from napari_issis.plugin.layers import shapes_data
 
@@ -161,7 +160,7 @@ def test_preview_renders_only_what_moves(scene, mouse, monkeypatch):
     assert renders == []
     mouse.release(26.25, 12.5)
     scene.wait()
-    assert whole == [4]
+    assert renders == [4]
     final = scene.exposure
     assert final == fresh(scene)
     # The last preview was as good as the eye can tell.
@@ -175,7 +174,6 @@ def test_exposure_seed_and_neutral_filters_render_nothing(scene, monkeypatch):
         raise AssertionError("rendered")
 
     monkeypatch.setattr(picture, "noise_ready_rate", refuse)
-    monkeypatch.setattr(picture, "count_rate", refuse)
     scene.observation = SMALL.replace(exposure=500.0, filters=("NF1", "NF2"))
     scene.seed = 4
     scene.new_noise()
