@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..observation import Observation
 from ..psf import RadialPSF
 from ..sources import SourceArrays, check_sources
+from .bounds import brightest_pixels, unseen
 from .direct import add_direct, has_sharp_edge
 from .gaussians import NODES, decompose
 from .meshes import LARGEST_DISC, mesh_rate
@@ -77,6 +78,7 @@ def render(
         return np.zeros(observation.shape)
     optics = Optics(observation.effective_psf, observation.pixel_scale)
     own_peak = peaks(optics, arrays, rate)
+    bound = brightest_pixels(optics, observation.shape, arrays, rate)
     least = 1e-14 * float(own_peak.max())
     # The image's peak is not known yet: start from what the sources in the frame give.
     inside = (np.abs(arrays.y - 0.5 * (observation.shape[0] - 1)) <= 0.5 * observation.shape[0]) & (
@@ -88,7 +90,14 @@ def render(
         if absolute is not None:
             allowed = min(allowed, max(absolute, SMALLEST_TOLERANCE * peak))
         allowed = max(allowed, least)
-        image = _render(optics, observation.shape, arrays, rate, allowed, own_peak)
+        dark = unseen(bound, 0.05 * allowed)
+        image = (
+            _render(
+                optics, observation.shape, arrays.take(~dark), rate[~dark], allowed, own_peak[~dark]
+            )
+            if not dark.all()
+            else np.zeros(observation.shape)
+        )
         found = float(image.max())
         if allowed <= least or found >= 0.5 * peak:
             return image

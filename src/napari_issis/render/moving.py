@@ -6,14 +6,13 @@ the source is moved, only the phases change.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, special
+from scipy import fft
 
 from ..psf import RadialPSF
 from ..sources import SourceArrays
+from .bounds import RADII, psf_envelope
 from .direct import has_sharp_edge
 from .discs import disc_half_sizes
 from .folding import fold_half, fold_rows
@@ -28,8 +27,6 @@ MOST_MODES = 4_000_000
 # share of the light allowed to be missing that each of three omissions may take: beyond the
 # window, above the highest frequency, and wrapped around
 SHARE = 0.4
-# radii in pixels at which a PSF is looked at; beyond, no PSF falls more slowly than r^-2
-RADII = np.concatenate([np.arange(0.0, 8.0, 0.5), np.geomspace(8.0, 400.0, 100)])
 
 
 class MovingSource:
@@ -110,29 +107,13 @@ def _wing(optics: Optics, level: float) -> float:
     """Distance in pixels beyond which a point source of unit rate stays below a level."""
     if not isinstance(optics.psf, RadialPSF):
         return optics.extent + 50.0
-    envelope = _envelope(optics)
+    envelope = psf_envelope(optics)
     above = np.flatnonzero(envelope > level)
     if not above.size:
         return 0.0
     if above[-1] + 1 < RADII.size:
         return float(RADII[above[-1] + 1])
     return float(RADII[-1] * np.sqrt(envelope[-1] / level))
-
-
-@lru_cache(maxsize=16)
-def _envelope(optics: Optics) -> Array:
-    """Largest brightness per pixel of a point source of unit rate beyond each of the RADII."""
-    psf = optics.psf
-    assert isinstance(psf, RadialPSF)
-    limit = optics.band_limit(1e-12)
-    x, w = np.polynomial.legendre.leggauss(16)
-    panels = int(limit * RADII[-1]) + 8
-    k = ((np.arange(panels)[:, None] + 0.5 * (x + 1)) * (limit / panels)).ravel()
-    # the pixel as it acts along its own axis, averaged least
-    measure = np.pi * (limit / panels) * np.tile(w, panels) * k
-    measure *= psf.otf(k / optics.pixel_scale) / np.sqrt(1 + (np.pi * k) ** 2)
-    brightness = special.j0(2 * np.pi * np.outer(RADII, k)) @ measure
-    return np.maximum.accumulate(np.abs(brightness)[::-1])[::-1]
 
 
 def _needed_limit(optics: Optics, one: SourceArrays, rate: float, share: float) -> float:
