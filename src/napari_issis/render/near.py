@@ -22,7 +22,7 @@ from .folding import fold_half, fold_rows
 from .gaussians import Gaussians
 from .optics import Transfer
 from .painting import half_patch, half_patches, paint
-from .plan import Plan, spread_cut
+from .plan import NEAR_UNIT, Plan, spread_cut
 from .rings import Band, band_transfer
 from .threads import in_threads
 
@@ -137,7 +137,7 @@ def _axes(
             high = max(high, float((centre + half).max(initial=-np.inf)))
         start = int(np.floor(low))
         need = max(high - start, shape[axis] - 1 + reach - low, high + reach) + 1
-        period = plan.near_unit * fft.next_fast_len(int(np.ceil(need / plan.near_unit)), real=True)
+        period = NEAR_UNIT * fft.next_fast_len(int(np.ceil(need / NEAR_UNIT)), real=True)
         axes.append(Axis(start, period, round(period / cell), int(plan.highest * period)))
     return axes[0], axes[1]
 

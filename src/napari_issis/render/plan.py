@@ -1,15 +1,16 @@
-"""How the spatial frequencies are split between stamps and meshes, for a given accuracy.
+"""How the spatial frequencies are split between meshes, for a given accuracy.
 
 The transfer function W is split by smooth low-pass filters G_0 > G_1 > ... of falling cut-off,
 
     W = W (1 - G_0)  +  W (G_0 - G_1)  +  W (G_1 - G_2)  +  ...
 
-The first term is compact about each source, which is rendered alone on a stamp. Each of the
-others belongs to a mesh whose cells are twice as wide as the one's before; its kernel reaches
-twice as far, but always over the same number of cells. So the r^-3 wings of a diffraction PSF
-and the wings of de Vaucouleurs galaxies are followed as far as they matter at a cost that
-grows with the logarithm of the distance, and nothing wraps around. This is multilevel
-summation (Skeel, Tezcan & Hardy 2002, J. Comput. Chem. 23, 673) with exact convolutions.
+The first term is compact about each source: one fine mesh carries it (`near`) or, where sources
+are few, a stamp for each of them (`stamps`). Each of the others belongs to a mesh whose cells
+are twice as wide as the one's before; its kernel reaches twice as far, but always over the same
+number of cells. So the r^-3 wings of a diffraction PSF and the wings of de Vaucouleurs galaxies
+are followed as far as they matter at a cost that grows with the logarithm of the distance, and
+nothing wraps around. This is multilevel summation (Skeel, Tezcan & Hardy 2002, J. Comput. Chem.
+23, 673) with exact convolutions.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 BAND = 0.35
 # the same for the fine mesh, whose result is only wanted at the pixels
 NEAR_BAND = 0.42
+# the fine mesh's period is a multiple of this many pixels
+NEAR_UNIT = 8
 # rings are cut at multiples of this distance in pixels, so that filters are shared
 RING_STEP = 64.0
 
@@ -75,15 +78,10 @@ class Plan:
         return highest
 
     @property
-    def near_unit(self) -> int:
-        """The fine mesh's period is a multiple of this many pixels."""
-        return 8
-
-    @property
     def near_cell(self) -> float:
         """Cell of the fine mesh in pixels: a multiple of it is a pixel, and FFTs are quick."""
-        least = int(np.ceil(self.near_unit * self.highest / NEAR_BAND))
-        return self.near_unit / int(fft.next_fast_len(least, real=True))
+        least = int(np.ceil(NEAR_UNIT * self.highest / NEAR_BAND))
+        return NEAR_UNIT / int(fft.next_fast_len(least, real=True))
 
     def near_spread(self) -> float:
         """Width in pixels of the Gaussian with which points are spread on the fine mesh."""
