@@ -91,16 +91,17 @@ def render(
             allowed = min(allowed, max(absolute, SMALLEST_TOLERANCE * peak))
         allowed = max(allowed, least)
         dark = unseen(bound, 0.05 * allowed)
-        image = (
-            _render(
-                optics, observation.shape, arrays.take(~dark), rate[~dark], allowed, own_peak[~dark]
-            )
-            if not dark.all()
-            else np.zeros(observation.shape)
-        )
-        found = float(image.max())
-        if allowed <= least or found >= 0.5 * peak:
-            return image
+        if dark.all():
+            # no pixel is brighter than all bounds together
+            found = float(bound.sum())
+            if allowed <= least:
+                return np.zeros(observation.shape)
+        else:
+            seen = arrays.take(~dark)
+            image = _render(optics, observation.shape, seen, rate[~dark], allowed, own_peak[~dark])
+            found = float(image.max())
+            if allowed <= least or found >= 0.5 * peak:
+                return image
         peak = max(min(found, 0.1 * peak), least)
 
 

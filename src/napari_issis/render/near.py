@@ -91,9 +91,8 @@ def near_rate(
     y, x = axes
     if y.count * x.count > LARGEST_MESH:
         raise ValueError(
-            f"this accuracy needs a mesh of {y.count} x {x.count} points, because the PSF's "
-            "diffraction rings reach far; choose a larger tolerance, a smaller frame or a PSF "
-            "averaged over a band."
+            f"this frame, PSF and accuracy need a mesh of {y.count} x {x.count} points, more than "
+            "fits into memory; choose a smaller frame, a larger tolerance or a wider PSF."
         )
     # room for the transform of each row in its own place
     rows = np.zeros((y.count, 2 * (x.count // 2 + 1)))

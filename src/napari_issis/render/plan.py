@@ -270,4 +270,4 @@ def _stamp_seconds(plan: Plan, points: int, extended: int) -> float:
     pixels = 2 * plan.reach(-1) + 1
     modes = pixels * plan.highest
     product = 2e-10 * (pixels * modes**2 + pixels**2 * modes)
-    return points * product + extended * (4 * product + 1e-7 * modes**2)
+    return points * product + extended * (2e-3 + 4 * product + 1e-7 * modes**2)
