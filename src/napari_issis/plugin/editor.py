@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..sources import (
     empty_sources,
     source,
 )
+from .history import History, SourceState
 from .picture import HeldSources
 from .source_layers import EllipsesLayer, Ids, PointsLayer, SourceLayer
 from .table import join, master_table
@@ -48,6 +49,8 @@ class SourceEditor:
         What a drag (or drawing) in progress holds.
     new_source : dict
         Arguments of `napari_issis.source` for sources that are drawn by hand.
+    history : History
+        The states of the table at rest, for undo and redo.
     """
 
     def __init__(self, changed: Callable[[], None]) -> None:
@@ -68,12 +71,13 @@ class SourceEditor:
             "n": None,
         }
         self._last_id = 0
-        # Rows of deleted sources by id: these can come back by paste.
-        self._deleted: dict[int, QTable] = {}
+        # By id, the table and row of each deleted source: these can come back by paste.
+        self._deleted: dict[int, tuple[QTable, int]] = {}
         self._adding = False
         self._untidy = False
         self._born: set[int] = set()
         self._writing = False
+        self.history = History(self._state())
 
     @property
     def views(self) -> tuple[SourceLayer, SourceLayer]:
@@ -89,17 +93,60 @@ class SourceEditor:
 
     def replace(self, table: QTable) -> None:
         """Put a master table in the place of all sources; `write` shows it."""
-        self.held = None
-        self._born.clear()
-        self.sources = table
-        self.source_id = self._new_ids(len(table))
-        self.version += 1
+        self._set(table, self._new_ids(len(table)))
 
     def append(self, table: QTable) -> None:
         """Append the rows of a master table; `write` shows them."""
-        self.sources = join(self.sources, table, pivot=self.pivot)
-        self.source_id = np.concatenate([self.source_id, self._new_ids(len(table))])
+        joined = join(self.sources, table, pivot=self.pivot)
+        self._set(joined, np.concatenate([self.source_id, self._new_ids(len(table))]))
+
+    def remove(self, ids: Iterable[int]) -> None:
+        """Remove the rows with these ids; `write` takes them from the layers."""
+        gone = np.isin(self.source_id, list(ids))
+        if gone.any():
+            self._bury(gone)
+            self._set(self.sources[~gone], self.source_id[~gone])
+
+    def change(self, table: QTable) -> None:
+        """Put a master table with the same rows, edited, in the table's place; `write` shows it."""
+        self._set(table, self.source_id)
+
+    def undo(self) -> bool:
+        """Take the last edit back; False if there is none, or while the mouse holds a source."""
+        return self.held is None and self._restore(self.history.undo())
+
+    def redo(self) -> bool:
+        """Do again what was undone; False if there is nothing."""
+        return self.held is None and self._restore(self.history.redo())
+
+    def _restore(self, state: SourceState | None) -> bool:
+        if state is None:
+            return False
+        gone = np.isin(self.source_id, state.source_id, invert=True)
+        self._bury(gone)
+        self._set(state.sources, state.source_id)
+        return True
+
+    def _set(self, table: QTable, source_id: Ids) -> None:
+        self.held = None
+        self._born.clear()
+        self.sources, self.source_id = table, source_id
         self.version += 1
+        self._note()
+
+    def _note(self) -> None:
+        """Let the present state be a step of the history, if it differs from the last."""
+        self.history.note(self._state())
+
+    def _state(self) -> SourceState:
+        return SourceState(self.sources, self.source_id)
+
+    def _bury(self, gone: NDArray[np.bool_]) -> None:
+        """Keep rows that go, for those that come back by paste."""
+        rows = self.sources[gone]
+        self._deleted.update(
+            (int(number), (rows, place)) for place, number in enumerate(self.source_id[gone])
+        )
 
     def write(self) -> None:
         """Make the layers show the table."""
@@ -176,6 +223,7 @@ class SourceEditor:
         if self.held is None and self._untidy:
             self._adding = self._untidy = False
             self._tidy()
+            self._note()
 
     def _refused(self, view: SourceLayer) -> bool:
         """Remove shapes that can be no sources, unless one is being drawn just now."""
@@ -194,8 +242,7 @@ class SourceEditor:
         """Bring the table in step with one layer."""
         mine = np.isin(self.source_id, view.source_id)
         if view.layer is None:
-            for row in np.flatnonzero(mine):
-                self._deleted[int(self.source_id[row])] = self.sources[[row]]
+            self._bury(mine)
             self.sources, self.source_id = self.sources[~mine], self.source_id[~mine]
             view.forget()
             return
@@ -213,8 +260,7 @@ class SourceEditor:
         for row in fresh:
             both = join(both, self._drawn(view, row), pivot=self.pivot)
         # From here on nothing can fail.
-        for row in np.flatnonzero(~kept):
-            self._deleted[int(self.source_id[row])] = self.sources[[row]]
+        self._bury(~kept)
         ids = self._new_ids(len(fresh))
         self.sources, self.source_id = both, np.concatenate([self.source_id[kept], ids])
         if len(fresh):
@@ -240,7 +286,8 @@ class SourceEditor:
         if not self._adding and place >= 0:
             base = self.sources[[place]]
         elif not self._adding and source_id in self._deleted:
-            base = self._deleted[source_id].copy()
+            rows, place = self._deleted[source_id]
+            base = rows[[place]]
         else:
             base = self._template(view, *data[row].reshape(-1, 2).mean(axis=0))
         return view.moved(base, view.geometry(base), data[row : row + 1])

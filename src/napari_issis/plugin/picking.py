@@ -1,8 +1,45 @@
-"""Press on a source of either layer to select and drag it: two layers that act as one."""
+"""The source under the pointer, on whichever of our layers it is: two layers that act as one."""
 
 from __future__ import annotations
 
 from typing import Any
+
+PICKING_MODES = ("pan_zoom", "select")
+
+
+def source_under(layers: Any, ours: list[Any], position: Any) -> tuple[Any, int | None] | None:
+    """Find the uppermost source at a position.
+
+    Parameters
+    ----------
+    layers : napari.components.LayerList
+        The viewer's layers, from the bottom up.
+    ours : list of layers
+        Image, ellipses and points of the scene.
+    position : sequence of float
+        World coordinates.
+
+    Returns
+    -------
+    (layer, row) or None
+        Row is None on a handle of the selected ellipses, which may lie outside them.
+    """
+    for layer in reversed(list(layers)):
+        if not any(layer is own for own in ours) or not hasattr(layer, "selected_data"):
+            continue
+        if not layer.visible or not layer.editable:
+            continue
+        value = layer.get_value(position, world=True)
+        hit, handle = value if isinstance(value, tuple) else (value, None)
+        if hit is not None or (handle is not None and layer is layers.selection.active):
+            return layer, None if hit is None else int(hit)
+    return None
+
+
+def has_mouse(layers: Any, ours: list[Any]) -> bool:
+    """Whether the mouse picks sources: one of our layers is active and nothing is being drawn."""
+    active = layers.selection.active
+    return any(active is own for own in ours) and active.mode in PICKING_MODES
 
 
 def activate_source_under(layers: Any, ours: list[Any], event: Any) -> None:
@@ -11,30 +48,14 @@ def activate_source_under(layers: Any, ours: list[Any], event: Any) -> None:
     napari hands a press to the active layer only, after the viewer's own callbacks; so a
     layer made active here gets the same press and drags the source. Layers of others, and
     a layer of ours in a drawing or editing mode, keep the mouse.
-
-    Parameters
-    ----------
-    layers : napari.components.LayerList
-        The viewer's layers, from the bottom up.
-    ours : list of layers
-        Image, ellipses and points of the scene.
-    event : napari mouse event
-        The press.
     """
-    active = layers.selection.active
-    if active not in ours or active.mode not in ("pan_zoom", "select") or event.button != 1:
+    if event.button != 1 or not has_mouse(layers, ours):
         return
-    sources = [layer for layer in ours if hasattr(layer, "selected_data")]
-    for layer in reversed(list(layers)):
-        if layer not in sources or not layer.visible or not layer.editable:
-            continue
-        value = layer.get_value(event.position, world=True)
-        hit = value[0] if isinstance(value, tuple) else value
-        # The handles of selected ellipses lie outside them.
-        handle = isinstance(value, tuple) and value[1] is not None and layer is active
-        if hit is not None or handle:
-            if active is not layer:
-                layers.selection.active = layer
-            if layer.mode != "select":
-                layer.mode = "select"
-            return
+    found = source_under(layers, ours, event.position)
+    if found is None:
+        return
+    layer, _ = found
+    if layers.selection.active is not layer:
+        layers.selection.active = layer
+    if layer.mode != "select":
+        layer.mode = "select"

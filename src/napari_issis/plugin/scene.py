@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import Any, cast
 from weakref import WeakValueDictionary
 
@@ -22,7 +23,7 @@ from .counts_layer import CountsLayer
 from .editor import SourceEditor
 from .latest_wins import LatestWins
 from .marks import MARKER
-from .picking import activate_source_under
+from .picking import activate_source_under, has_mouse, source_under
 from .picture import HeldSources, Picture, PictureMaker
 from .table import master_table
 
@@ -80,6 +81,7 @@ class Scene:
         self._pause.timeout.connect(self._request_final)
 
         viewer.mouse_drag_callbacks.append(self._pick)
+        viewer.mouse_double_click_callbacks.append(self._double_click)
         viewer.layers.events.removed.connect(self._layer_removed)
         _SCENES[id(viewer)] = self
 
@@ -182,6 +184,24 @@ class Scene:
         self.editor.append(master_table(table))
         self._sources_set()
 
+    def remove(self, ids: Iterable[int]) -> None:
+        """Remove the sources with these ids (of `SourceEditor.source_id`)."""
+        self.editor.take_over()
+        self.editor.remove(ids)
+        self._show_sources()
+
+    def undo(self, event: Any = None) -> None:
+        """Take back the last edit of the sources; nothing while the mouse holds one."""
+        self.editor.take_over()
+        if self.editor.undo():
+            self._show_sources()
+
+    def redo(self, event: Any = None) -> None:
+        """Do again the edit that was taken back last."""
+        self.editor.take_over()
+        if self.editor.redo():
+            self._show_sources()
+
     def wait(self, timeout: float = 60.0) -> None:
         """Wait until the picture is settled; keeps the window alive meanwhile.
 
@@ -233,13 +253,18 @@ class Scene:
         self.viewer.reset_view(layers=[image])
         for layer in self.editor.layers:
             self.editor.listen(layer)
+        for layer in self.layers:
+            self._bind_keys(layer)
         self.observation, self.seed = exposure.observation, exposure.seed
         self.sources = exposure.sources
 
     def _sources_set(self) -> None:
+        self.counts.rescale()
+        self._show_sources()
+
+    def _show_sources(self) -> None:
         self._ensure_layers()
         self.editor.write()
-        self.counts.rescale()
         self._soon()
 
     def _ensure_layers(self) -> None:
@@ -252,6 +277,7 @@ class Scene:
             image = self.counts.make(self._observation.shape, self._picture)
             place = min((layers.index(above) for above in self.editor.layers), default=len(layers))
             layers.insert(place, image)
+            self._bind_keys(image)
         with self.editor.quiet():
             for view in self.editor.views:
                 if view.layer is None:
@@ -261,8 +287,14 @@ class Scene:
                     below = view is self.editor.ellipses and points is not None
                     layers.insert(layers.index(points) if below else len(layers), view.layer)
                     self.editor.listen(view.layer)
+                    self._bind_keys(view.layer)
         if new:
             self.viewer.reset_view(layers=[self.counts.layer])
+
+    def _bind_keys(self, layer: Any) -> None:
+        """Bind our keys on a layer of ours: those of the viewer belong to the user."""
+        layer.bind_key("Control-Z", self.undo, overwrite=True)
+        layer.bind_key("Control-Shift-Z", self.redo, overwrite=True)
 
     def _fit_marks(self) -> None:
         with self.editor.quiet():
@@ -296,6 +328,16 @@ class Scene:
 
     def _pick(self, _viewer: Any, event: Any) -> None:
         activate_source_under(self.viewer.layers, self.layers, event)
+
+    def _double_click(self, _viewer: Any, event: Any) -> None:
+        """Remove the source under the pointer."""
+        layers = self.viewer.layers
+        if event.button != 1 or not has_mouse(layers, self.layers):
+            return
+        found = source_under(layers, self.layers, event.position)
+        if found is not None and found[1] is not None:
+            layer, row = found
+            self.remove([int(layer.features["source_id"].iloc[row])])
 
     # ---------------------------------------------------------------- from scene to image
 
@@ -416,6 +458,7 @@ def open_scene(
     # Widgets get a proxy of the viewer, which must not be mistaken for another one.
     viewer = cast(Viewer, getattr(viewer, "__wrapped__", viewer))
     scene = scene_of(viewer)
+    new = scene is None
     if scene is None:
         scene = Scene(viewer)
         found = marked_layers(viewer)
@@ -427,6 +470,8 @@ def open_scene(
         scene.seed = seed
     if table is not None:
         scene.sources = table
+    if new:
+        scene.editor.history.restart(scene.editor.history.present)
     scene.show_layers()
     if dock:
         from .dock import dock_simulator
