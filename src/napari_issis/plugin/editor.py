@@ -343,6 +343,11 @@ class SourceEditor:
             with self.quiet():
                 view.recolor(kinds)
 
+    def row_of(self, source_id: int) -> int | None:
+        """Row of the table with an id, None if there is none."""
+        rows = np.flatnonzero(self.source_id == source_id)
+        return int(rows[0]) if rows.size else None
+
     def _places(self, ids: Any) -> NDArray[np.intp]:
         """Rows of the table with these ids, -1 where there is none."""
         known = {int(value): place for place, value in enumerate(self.source_id)}

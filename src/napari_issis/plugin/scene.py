@@ -23,11 +23,12 @@ from .counts_layer import CountsLayer
 from .editor import SourceEditor
 from .latest_wins import LatestWins
 from .marks import MARKER
-from .picking import activate_source_under, has_mouse, source_under
 from .picture import HeldSources, Picture, PictureMaker
+from .pointer import Pointer
 from .table import master_table
+from .units import Units
 
-# The live scene of each viewer, kept alive by the viewer's mouse callbacks.
+# The live scene of each viewer, kept alive by its pointer in the viewer's mouse callbacks.
 _SCENES: WeakValueDictionary[int, Scene] = WeakValueDictionary()
 
 # A drag that rests for so long (ms) is shown as it will be when it ends.
@@ -50,15 +51,21 @@ class Scene:
     Attributes
     ----------
     events : napari.utils.events.EmitterGroup
-        ``picture`` after each exposure that came to the screen at rest, ``observation`` after
-        a change of the instrument set-up or the seed.
+        ``picture`` after each exposure that came to the screen at rest, ``preview`` after each
+        other one, ``observation`` after a change of the instrument set-up or the seed,
+        ``sources`` after a change of the source table, also during a drag.
+    units : Units
+        What fluxes and lengths are shown in.
     """
 
     def __init__(self, viewer: Viewer) -> None:
         self.viewer = viewer
-        self.events = EmitterGroup(source=self, picture=Event, observation=Event)
+        self.events = EmitterGroup(
+            source=self, picture=Event, preview=Event, observation=Event, sources=Event
+        )
         self.editor = SourceEditor(self._soon)
         self.counts = CountsLayer()
+        self.units = Units()
         self._observation = Observation()
         self._fit_marks()
         self._seed = 0
@@ -70,6 +77,7 @@ class Scene:
         self._picture: Picture | None = None
         self._error: BaseException | None = None
         self._set_up = 0
+        self._told_version = 0
         self._requested: tuple[Any, bool] = (None, False)
         self._shown: tuple[Any, bool] = (None, False)
         self._timer = QTimer()
@@ -80,8 +88,7 @@ class Scene:
         self._pause.setInterval(PAUSE)
         self._pause.timeout.connect(self._request_final)
 
-        viewer.mouse_drag_callbacks.append(self._pick)
-        viewer.mouse_double_click_callbacks.append(self._double_click)
+        self.pointer = Pointer(self)
         viewer.layers.events.removed.connect(self._layer_removed)
         _SCENES[id(viewer)] = self
 
@@ -326,19 +333,6 @@ class Scene:
         if not self.layers and self.viewer.scene.camera.orientation2d == ORIENTATION:
             self.viewer.scene.camera.orientation2d = self._orientation
 
-    def _pick(self, _viewer: Any, event: Any) -> None:
-        activate_source_under(self.viewer.layers, self.layers, event)
-
-    def _double_click(self, _viewer: Any, event: Any) -> None:
-        """Remove the source under the pointer."""
-        layers = self.viewer.layers
-        if event.button != 1 or not has_mouse(layers, self.layers):
-            return
-        found = source_under(layers, self.layers, event.position)
-        if found is not None and found[1] is not None:
-            layer, row = found
-            self.remove([int(layer.features["source_id"].iloc[row])])
-
     # ---------------------------------------------------------------- from scene to image
 
     @property
@@ -353,6 +347,9 @@ class Scene:
         """Bring table and picture in step with what the user did; cheap if nothing changed."""
         self._timer.stop()
         self.editor.take_over()
+        if self._told_version != self.editor.version:
+            self._told_version = self.editor.version
+            self.events.sources()
         held = self.editor.held
         if not self.layers:
             self._jobs.drop()
@@ -403,7 +400,9 @@ class Scene:
             self.viewer.reset_view(layers=[self.counts.layer])
         if picture.final:
             self.events.picture()
-        elif self._shown[0] == self._version:
+            return
+        self.events.preview()
+        if self._shown[0] == self._version:
             # The mouse rests: when it does so for long, show what the drag would end with.
             self._pause.start()
 

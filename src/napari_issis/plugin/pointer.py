@@ -1,0 +1,94 @@
+"""What the pointer does over a scene: it picks, removes and describes sources."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qtpy.QtGui import QCursor
+from qtpy.QtWidgets import QApplication, QToolTip
+from superqt.utils import qthrottled
+
+from .picking import activate_source_under, has_mouse, source_under
+from .readout import pixel_text, source_text
+
+# Milliseconds between two descriptions.
+REST = 50
+
+
+class Pointer:
+    """The pointer over the canvas of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The live scene. The viewer's mouse callbacks keep it alive.
+    """
+
+    def __init__(self, scene: Any) -> None:
+        self.scene, self.viewer = scene, scene.viewer
+        self.shown = ""
+        self.viewer.mouse_drag_callbacks.append(self._press)
+        self.viewer.mouse_double_click_callbacks.append(self._double_click)
+        self.viewer.cursor.events.position.connect(self._moved)
+        self.viewer.events.status.connect(self._status)
+        self._describe_soon = qthrottled(self.describe, timeout=REST)
+
+    def _press(self, _viewer: Any, event: Any) -> None:
+        self.hide()
+        activate_source_under(self.viewer.layers, self.scene.layers, event)
+
+    def _double_click(self, _viewer: Any, event: Any) -> None:
+        """Remove the source under the pointer."""
+        layers = self.viewer.layers
+        if event.button != 1 or not has_mouse(layers, self.scene.layers):
+            return
+        layer, row = source_under(layers, self.scene.layers, event.position) or (None, None)
+        if row is not None:
+            self.scene.remove([int(layer.features["source_id"].iloc[row])])
+
+    def _moved(self, event: Any = None) -> None:
+        if has_mouse(self.viewer.layers, self.scene.layers):
+            self._describe_soon()
+        elif self.shown:
+            self.hide()
+
+    def describe(self) -> None:
+        """Show the parameters of the source under the pointer beside it, or nothing."""
+        text = ""
+        if self.scene.editor.held is None and self.viewer.mouse_over_canvas:
+            text = self.source_here()
+        if not text:
+            self.hide()
+        elif text != self.shown or not QToolTip.isVisible():
+            self.shown = text
+            QToolTip.showText(QCursor.pos(), text, QApplication.widgetAt(QCursor.pos()))
+
+    def hide(self) -> None:
+        """Take the description away; a tooltip of others stays."""
+        if self.shown:
+            self.shown = ""
+            QToolTip.hideText()
+
+    def source_here(self) -> str:
+        """Describe the source under the pointer; empty if there is none."""
+        layers, scene = self.viewer.layers, self.scene
+        found = source_under(layers, scene.layers, self.viewer.cursor.position)
+        layer, row = found or (None, None)
+        if row is None:
+            return ""
+        place = scene.editor.row_of(int(layer.features["source_id"].iloc[row]))
+        if place is None:
+            return ""
+        return source_text(scene.editor.sources[place], scene.observation, scene.units)
+
+    def _status(self, event: Any = None) -> None:
+        """Put the pixel under the pointer into the status line, where napari shows its own."""
+        image = self.scene.counts.layer
+        picture = self.scene.picture
+        active = self.viewer.layers.selection.active
+        if image is None or picture is None or not any(active is own for own in self.scene.layers):
+            return
+        y, x = image.world_to_data(self.viewer.cursor.position)[-2:]
+        text = pixel_text(picture.exposure, x, y)
+        if text and self.viewer.status != text:
+            self.viewer.status = text
