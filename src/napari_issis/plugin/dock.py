@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from magicgui.widgets import PushButton
 from napari.utils.notifications import show_error, show_info
 from qtpy.QtCore import Qt
-from qtpy.QtGui import QHideEvent, QShowEvent
-from qtpy.QtWidgets import QFileDialog, QFrame, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from qtpy.QtGui import QHideEvent, QKeySequence, QShortcut, QShowEvent
+from qtpy.QtWidgets import (
+    QFileDialog,
+    QFrame,
+    QHBoxLayout,
+    QPushButton,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
 
 from .instrument_form import InstrumentForm
+from .panels import LIST_NAME, toggle_panel
 from .scene import open_scene
 from .source_form import SourceForm
+from .source_list import SourceList
 from .writer import fits_path
 
 DOCK_NAME = "ISSIS simulator"
@@ -36,6 +47,21 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             text="Sav&e FITS…", tooltip="Save counts, expected counts and sources as a FITS file"
         )
         self.save.changed.connect(self.save_fits)
+        tools = QHBoxLayout()
+        tools.setContentsMargins(4, 0, 4, 0)
+        self.undo = _tool("&Undo", self.scene.undo)
+        self.redo = _tool("&Redo", self.scene.redo)
+        self.list = _tool("Sources…", self.toggle_list)
+        self.list.setToolTip("Show or hide the list of sources")
+        for button in (self.undo, self.redo, self.list):
+            tools.addWidget(button)
+        for keys, action in (
+            (QKeySequence.StandardKey.Undo, self.scene.undo),
+            (QKeySequence.StandardKey.Redo, self.scene.redo),
+        ):
+            shortcut = QShortcut(QKeySequence(keys), self)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut.activated.connect(action)
         self._following = False
 
         page = QWidget()
@@ -58,6 +84,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         buttons.addWidget(self.sources.button.native)
         buttons.addWidget(self.save.native)
         layout.addLayout(buttons)
+        layout.addLayout(tools)
         self.setMinimumWidth(330)
 
     def save_fits(self, event: Any = None) -> None:
@@ -75,6 +102,20 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         else:
             show_info(f"Saved {target}")
 
+    def toggle_list(self) -> None:
+        """Show or hide the list of sources."""
+        toggle_panel(self.scene.viewer, LIST_NAME, SourceList, "bottom")
+
+    def show_steps(self, event: Any = None) -> None:
+        """Say on the buttons what would be undone and done again."""
+        history = self.scene.editor.history
+        for button, what, step, keys in (
+            (self.undo, "Undo", history.last_step, "Ctrl+Z"),
+            (self.redo, "Redo", history.next_step, "Ctrl+Shift+Z"),
+        ):
+            button.setEnabled(bool(step))
+            button.setToolTip(f"{what}: {step} ({keys})" if step else f"Nothing to {what.lower()}")
+
     def ask_path(self) -> str | None:
         """Ask for the file to write; None if the user changed his mind."""
         dialog = QFileDialog(self, "Save exposure", "issis.fits", "FITS (*.fits)")
@@ -88,6 +129,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self._following = True
             self.instrument.resume()
             self.sources.resume()
+            self.scene.events.picture.connect(self.show_steps)
+            self.show_steps()
         super().showEvent(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -96,7 +139,15 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self._following = False
             self.instrument.pause()
             self.sources.pause()
+            self.scene.events.picture.disconnect(self.show_steps)
         super().hideEvent(event)
+
+
+def _tool(label: str, action: Callable[[], None]) -> QPushButton:
+    button = QPushButton(label)
+    # without the flag that Qt hands over
+    button.clicked.connect(lambda _=False: action())
+    return button
 
 
 def dock_simulator(viewer: Any) -> None:

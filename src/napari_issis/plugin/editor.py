@@ -36,6 +36,8 @@ class SourceEditor:
     changed : callable
         Called, without arguments and often, when a layer may have been edited; `take_over`
         then finds out.
+    selected : callable
+        Called, without arguments, when the user has selected other sources in a layer.
 
     Attributes
     ----------
@@ -53,8 +55,9 @@ class SourceEditor:
         The states of the table at rest, for undo and redo.
     """
 
-    def __init__(self, changed: Callable[[], None]) -> None:
+    def __init__(self, changed: Callable[[], None], selected: Callable[[], None]) -> None:
         self._changed = changed
+        self._selected = selected
         self.points = PointsLayer()
         self.ellipses = EllipsesLayer()
         self.sources = master_table(empty_sources())
@@ -159,6 +162,28 @@ class SourceEditor:
         layer.events.set_data.connect(self._layer_changed)
         layer.events.features.connect(self._layer_changed)
         layer.events.data.connect(self._layer_edited)
+        layer.selected_data.events.items_changed.connect(self._selection_changed)
+
+    @property
+    def selected_ids(self) -> set[int]:
+        """Ids of the sources that are selected, on either layer."""
+        ids: set[int] = set()
+        for view in self.views:
+            if view.layer is not None:
+                current = view.current_ids()
+                rows = [row for row in view.layer.selected_data if row < current.size]
+                ids.update(current[rows].tolist())
+        return ids
+
+    def select(self, ids: Iterable[int]) -> None:
+        """Select the sources with these ids, and no others."""
+        chosen = list(ids)
+        with self.quiet():
+            for view in self.views:
+                if view.layer is not None:
+                    rows = np.flatnonzero(np.isin(view.current_ids(), chosen))
+                    view.layer.selected_data = set(rows.tolist())
+        self._selected()
 
     @contextmanager
     def quiet(self) -> Iterator[None]:
@@ -174,6 +199,16 @@ class SourceEditor:
     def _layer_changed(self, event: Any = None) -> None:
         if not self._writing:
             self._changed()
+
+    def deselect_all_but(self, layer: Any) -> None:
+        """Select nothing on the layers of sources other than this one."""
+        for view in self.views:
+            if view.layer is not None and view.layer is not layer and view.layer.selected_data:
+                view.layer.selected_data = set()
+
+    def _selection_changed(self, event: Any = None) -> None:
+        if not self._writing:
+            self._selected()
 
     def _layer_edited(self, event: Any) -> None:
         """Follow the start and end of a drag; napari tells no more during it."""

@@ -65,3 +65,8 @@ def marker_size(shape: tuple[int, int]) -> float:
 def edge_colors(kinds: Iterable[str]) -> list[str]:
     """Return the colour of the ellipse of each kind (white for none)."""
     return [ELLIPSE_COLORS.get(str(kind), "white") for kind in kinds]
+
+
+def kind_color(kind: str) -> str:
+    """Return the colour of a kind's marker."""
+    return str(POINTS["border_color"]) if kind == "point" else edge_colors([kind])[0]

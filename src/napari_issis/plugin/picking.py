@@ -37,24 +37,20 @@ def source_under(layers: Any, ours: list[Any], position: Any) -> tuple[Any, int 
 
 
 def has_mouse(layers: Any, ours: list[Any]) -> bool:
-    """Whether the mouse picks sources: one of our layers is active and nothing is being drawn."""
+    """Whether the mouse picks sources: one of our layers is active and nothing is being drawn.
+
+    Layers of others, and a layer of ours in a drawing or editing mode, keep the mouse.
+    """
     active = layers.selection.active
     return any(active is own for own in ours) and active.mode in PICKING_MODES
 
 
-def activate_source_under(layers: Any, ours: list[Any], event: Any) -> None:
-    """Make the layer active that has a source under the pointer.
+def activate(layers: Any, layer: Any) -> None:
+    """Make a layer of sources active, ready to select and drag.
 
     napari hands a press to the active layer only, after the viewer's own callbacks; so a
-    layer made active here gets the same press and drags the source. Layers of others, and
-    a layer of ours in a drawing or editing mode, keep the mouse.
+    layer made active in those gets the same press and drags the source.
     """
-    if event.button != 1 or not has_mouse(layers, ours):
-        return
-    found = source_under(layers, ours, event.position)
-    if found is None:
-        return
-    layer, _ = found
     if layers.selection.active is not layer:
         layers.selection.active = layer
     if layer.mode != "select":

@@ -8,7 +8,7 @@ from qtpy.QtGui import QCursor
 from qtpy.QtWidgets import QApplication, QToolTip
 from superqt.utils import qthrottled
 
-from .picking import activate_source_under, has_mouse, source_under
+from .picking import activate, has_mouse, source_under
 from .readout import pixel_text, source_text
 
 # Milliseconds between two descriptions.
@@ -34,17 +34,26 @@ class Pointer:
         self._describe_soon = qthrottled(self.describe, timeout=REST)
 
     def _press(self, _viewer: Any, event: Any) -> None:
+        """Let the press pick the source under the pointer, and only it unless Shift is held."""
         self.hide()
-        activate_source_under(self.viewer.layers, self.scene.layers, event)
+        layers, ours = self.viewer.layers, self.scene.layers
+        if event.button != 1 or not has_mouse(layers, ours):
+            return
+        found = source_under(layers, ours, event.position)
+        if found is not None:
+            activate(layers, found[0])
+        if not {"Shift", "Control"} & set(event.modifiers):
+            # what is selected on the active layer is napari's business
+            self.scene.editor.deselect_all_but(layers.selection.active)
 
     def _double_click(self, _viewer: Any, event: Any) -> None:
         """Remove the source under the pointer."""
         layers = self.viewer.layers
         if event.button != 1 or not has_mouse(layers, self.scene.layers):
             return
-        layer, row = source_under(layers, self.scene.layers, event.position) or (None, None)
-        if row is not None:
-            self.scene.remove([int(layer.features["source_id"].iloc[row])])
+        found = source_under(layers, self.scene.layers, event.position)
+        if found is not None and found[1] is not None:
+            self.scene.remove([_id(*found)])
 
     def _moved(self, event: Any = None) -> None:
         if has_mouse(self.viewer.layers, self.scene.layers):
@@ -73,10 +82,9 @@ class Pointer:
         """Describe the source under the pointer; empty if there is none."""
         layers, scene = self.viewer.layers, self.scene
         found = source_under(layers, scene.layers, self.viewer.cursor.position)
-        layer, row = found or (None, None)
-        if row is None:
+        if found is None or found[1] is None:
             return ""
-        place = scene.editor.row_of(int(layer.features["source_id"].iloc[row]))
+        place = scene.editor.row_of(_id(*found))
         if place is None:
             return ""
         return source_text(scene.editor.sources[place], scene.observation, scene.units)
@@ -92,3 +100,7 @@ class Pointer:
         text = pixel_text(picture.exposure, x, y)
         if text and self.viewer.status != text:
             self.viewer.status = text
+
+
+def _id(layer: Any, row: int | None) -> int:
+    return int(layer.features["source_id"].iloc[row])

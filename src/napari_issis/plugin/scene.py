@@ -53,7 +53,8 @@ class Scene:
     events : napari.utils.events.EmitterGroup
         ``picture`` after each exposure that came to the screen at rest, ``preview`` after each
         other one, ``observation`` after a change of the instrument set-up or the seed,
-        ``sources`` after a change of the source table, also during a drag.
+        ``sources`` after a change of the source table, also during a drag, ``selection`` when
+        other sources are selected.
     units : Units
         What fluxes and lengths are shown in.
     """
@@ -61,9 +62,14 @@ class Scene:
     def __init__(self, viewer: Viewer) -> None:
         self.viewer = viewer
         self.events = EmitterGroup(
-            source=self, picture=Event, preview=Event, observation=Event, sources=Event
+            source=self,
+            picture=Event,
+            preview=Event,
+            observation=Event,
+            sources=Event,
+            selection=Event,
         )
-        self.editor = SourceEditor(self._soon)
+        self.editor = SourceEditor(self._soon, self._selected)
         self.counts = CountsLayer()
         self.units = Units()
         self._observation = Observation()
@@ -191,6 +197,23 @@ class Scene:
         self.editor.append(master_table(table))
         self._sources_set()
 
+    def change(self, table: Table) -> None:
+        """Put an edited copy of `sources`, with the same rows, in its place.
+
+        Raises
+        ------
+        ValueError
+            If the table has an error or other rows; the scene stays as it was.
+        """
+        self.editor.take_over()
+        if len(table) != len(self.editor.sources):
+            raise ValueError(
+                f"the table has {len(table)} rows, the scene {len(self.editor.sources)} sources; "
+                "use `sources` or `add` to change their number."
+            )
+        self.editor.change(master_table(table))
+        self._show_sources()
+
     def remove(self, ids: Iterable[int]) -> None:
         """Remove the sources with these ids (of `SourceEditor.source_id`)."""
         self.editor.take_over()
@@ -302,6 +325,9 @@ class Scene:
         """Bind our keys on a layer of ours: those of the viewer belong to the user."""
         layer.bind_key("Control-Z", self.undo, overwrite=True)
         layer.bind_key("Control-Shift-Z", self.redo, overwrite=True)
+
+    def _selected(self) -> None:
+        self.events.selection()
 
     def _fit_marks(self) -> None:
         with self.editor.quiet():

@@ -1,0 +1,300 @@
+"""The columns of the source list: what is shown, and how it is read when it is typed."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from astropy import units as u
+from astropy.table import QTable
+from numpy.typing import NDArray
+
+from ..observation import Observation
+from ..signal_to_noise import expected_counts, signal_to_noise
+from ..sources import (
+    DEFAULT_ELLIPTICITY,
+    DEFAULT_FLUX,
+    DEFAULT_PA,
+    DEFAULT_R_HALF,
+    FLUX_UNIT,
+    KINDS,
+    check_sources,
+)
+from .number_field import number_text, read_number
+from .table import master_table
+from .units import FLUX_LABELS, LENGTH_LABELS, Units
+
+Array = NDArray[np.float64]
+DEFAULT_INDEX = 2.0
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the list.
+
+    Parameters
+    ----------
+    name : str
+        Name in the source table, or of a derived value.
+    label : str
+        Heading, less the unit.
+    form : str
+        Format of its numbers.
+    kinds : {"all", "extended", "sersic"}
+        Sources that have it.
+    tooltip : str
+        What it is.
+    editable : bool
+        Whether it is a parameter of the source.
+    """
+
+    name: str
+    label: str
+    form: str
+    kinds: str
+    tooltip: str
+    editable: bool = True
+
+    def applies(self, kind: str) -> bool:
+        """Whether sources of a kind have this value."""
+        return (
+            self.kinds == "all"
+            or kind == "sersic"
+            or (self.kinds == "extended" and kind != "point")
+        )
+
+
+COLUMNS = (
+    Column("kind", "kind", "", "all", "Profile"),
+    Column("x", "x", ".2f", "all", "Column of the centre, pixels (first pixel: 0)"),
+    Column("y", "y", ".2f", "all", "Row of the centre, pixels (first pixel: 0)"),
+    Column("flux", "F", ".4g", "all", "Flux averaged over the channel"),
+    Column("r_half", "R½", ".4g", "extended", "Semi-major axis of the half-light ellipse"),
+    Column("ellipticity", "ε", ".3f", "extended", "Ellipticity 1 − b/a"),
+    Column("pa", "PA", ".1f", "extended", "Position angle, from up counter-clockwise"),
+    Column("n", "n", ".3g", "sersic", "Sérsic index"),
+    Column("counts", "counts", ".4g", "all", "Counts in the exposure, all its light", False),
+    Column("snr", "S/N", ".3g", "all", "Signal-to-noise ratio, alone on the sky", False),
+)
+
+
+def heading(column: Column, units: Units) -> str:
+    """Label of a column with its unit."""
+    unit = {
+        "x": "px",
+        "y": "px",
+        "flux": units.flux_label,
+        "r_half": units.length_label,
+        "pa": "°",
+    }.get(column.name)
+    return column.label if unit is None else f"{column.label} ({unit})"
+
+
+def shown_values(table: QTable, observation: Observation, units: Units) -> dict[str, Any]:
+    """Values of all columns in the units shown, each of shape (n,); NaN where there is none."""
+    pivot = observation.channel_data.pivot
+    arrays = check_sources(table, pivot=pivot, pixel_scale=observation.pixel_scale)
+    extended = arrays.kind != "point"
+    return {
+        "kind": arrays.kind,
+        "x": arrays.x,
+        "y": arrays.y,
+        "flux": units.show_flux(arrays.flux, pivot),
+        "r_half": np.where(
+            extended, units.show_length(arrays.r_half, observation.pixel_scale), np.nan
+        ),
+        "ellipticity": np.where(extended, arrays.ellipticity, np.nan),
+        "pa": np.where(extended, arrays.pa, np.nan),
+        "n": np.where(arrays.kind == "sersic", arrays.index, np.nan),
+        "counts": expected_counts(table, observation),
+        "snr": signal_to_noise(table, observation),
+    }
+
+
+def text(column: Column, value: Any) -> str:
+    """Return a value as the list shows it."""
+    if column.name == "kind":
+        return str(value)
+    return "–" if np.isnan(value) else f"{value:{column.form}}"
+
+
+def exact_text(column: Column, value: Any) -> str:
+    """Return a value with all its digits, as it is edited and copied; empty if there is none."""
+    if column.name == "kind":
+        return str(value)
+    return "" if np.isnan(value) else number_text(float(value))
+
+
+def changed(
+    table: QTable, row: int, name: str, typed: str, observation: Observation, units: Units
+) -> QTable:
+    """Return the table with one value changed to what was typed.
+
+    Raises
+    ------
+    ValueError
+        If it is no number, or not allowed; the message names column and value.
+    """
+    one = table[[row]]
+    if name == "kind":
+        one["kind"] = np.array([typed], dtype="U13")
+        if typed in KINDS:
+            one = _with_structure(one)
+    else:
+        _set(one, name, read_number(name, typed), observation, units)
+    try:
+        check_sources(one, pivot=observation.channel_data.pivot)
+    except ValueError as error:
+        raise ValueError(str(error).removeprefix("row 0, ")) from None
+    table = table.copy()
+    for column in one.colnames:
+        if column not in table.colnames:
+            table[column] = np.full(len(table), np.nan)
+        table[column][row] = one[column][0]
+    return table
+
+
+def _set(one: QTable, name: str, number: float, observation: Observation, units: Units) -> None:
+    pivot = observation.channel_data.pivot
+    if name == "flux":
+        unit = one["flux"].unit
+        flux = units.read_flux(number, pivot)
+        if flux == 0 and unit != FLUX_UNIT:
+            raise ValueError(f"flux is 0, which cannot be given in {unit}; give one above 0.")
+        one["flux"] = (np.array([flux]) * FLUX_UNIT).to(unit, u.spectral_density(pivot * u.AA))
+    elif name == "r_half":
+        one["r_half"] = [units.read_length(number, observation.pixel_scale)] * u.pix
+    elif name == "pa":
+        one["pa"] = [number] * u.deg
+    else:
+        one[name] = [number]
+
+
+def _with_structure(one: QTable) -> QTable:
+    """Give a source whose kind was changed the structure that it lacks."""
+    r_half, ellipticity = one["r_half"].to_value(u.pix)[0], one["ellipticity"][0]
+    if not (np.isfinite(r_half) and r_half > 0):
+        one["r_half"] = [DEFAULT_R_HALF] * u.pix
+    if not 0 <= ellipticity < 1:
+        one["ellipticity"] = [DEFAULT_ELLIPTICITY]
+    if not np.isfinite(one["pa"].value[0]):
+        one["pa"] = [DEFAULT_PA] * u.deg
+    if one["kind"][0] == "sersic" and not ("n" in one.colnames and np.isfinite(one["n"][0])):
+        one["n"] = [DEFAULT_INDEX]
+    return one
+
+
+# ---------------------------------------------------------------- text of spreadsheets
+
+_NAMES = {"type": "kind", "f": "flux", "flux": "flux", "r1/2": "r_half", "e": "ellipticity"}
+_NAMES |= {column.name: column.name for column in COLUMNS if column.editable}
+_NAMES |= {column.label.lower(): column.name for column in COLUMNS}
+_UNITS = {label.lower(): ("flux", name) for name, label in FLUX_LABELS.items()}
+_UNITS |= {label.lower(): ("length", name) for name, label in LENGTH_LABELS.items()}
+_UNITS |= {"arcsec": ("length", "arcsec"), "pix": ("length", "px")}
+
+
+def to_text(values: Mapping[str, Any], rows: Any, units: Units) -> str:
+    """Rows of the list as tab-separated text under their headings."""
+    lines = ["\t".join(heading(column, units) for column in COLUMNS)]
+    lines += [
+        "\t".join(exact_text(column, values[column.name][row]) for column in COLUMNS)
+        for row in rows
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def from_text(pasted: str, observation: Observation, units: Units) -> QTable:
+    """Read sources from text, as a spreadsheet or `to_text` gives it.
+
+    Parameters
+    ----------
+    pasted : str
+        Cells separated by tabs, semicolons or commas. The first line may hold the names of
+        the columns, with units in parentheses; else they are those of the list, in its order.
+    observation : Observation
+        Gives the wavelength at which magnitudes are fluxes.
+    units : Units
+        Units of columns that name none.
+
+    Returns
+    -------
+    astropy.table.QTable
+        A master table. Sources without a kind are points; other missing columns have the
+        defaults of `napari_issis.source`.
+
+    Raises
+    ------
+    ValueError
+        If there is no source, or a value is wrong; the message names line and column.
+    """
+    lines = [line for line in pasted.splitlines() if line.strip()]
+    if not lines:
+        raise ValueError("there is no text to paste; copy rows of a list of sources first.")
+    mark = next((mark for mark in "\t;," if mark in lines[0]), "\t")
+    cells = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
+    names = [column.name for column in COLUMNS]
+    units = Units(units.flux, units.length)
+    has_head = any(_split(cell)[0] in ("x", "flux") for cell in cells[0])
+    if has_head:
+        names = []
+        for cell in cells.pop(0):
+            name, unit = _split(cell)
+            names.append(name)
+            if unit in _UNITS:
+                setattr(units, *_UNITS[unit])
+    rows = []
+    first = 2 if has_head else 1
+    for number, line in enumerate(cells, start=first):
+        row = {name: cell for name, cell in zip(names, line, strict=False) if cell not in ("", "–")}
+        try:
+            rows.append(_row(row, observation, units))
+        except ValueError as error:
+            raise ValueError(f"line {number} of the text: {error}") from None
+    if not rows:
+        raise ValueError("the text holds no source; it has headings only.")
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    columns["flux"] = columns["flux"] * FLUX_UNIT
+    columns["r_half"] = columns["r_half"] * u.pix
+    columns["pa"] = columns["pa"] * u.deg
+    try:
+        return master_table(QTable(columns))
+    except ValueError as error:
+        raise ValueError(
+            re.sub(r"^row (\d+)", lambda m: f"line {int(m[1]) + first} of the text", str(error))
+        ) from None
+
+
+def _split(cell: str) -> tuple[str, str]:
+    """Name of a column and its unit from a heading."""
+    name, _, unit = cell.lower().partition("(")
+    return _NAMES.get(name.strip(), name.strip()), unit.rstrip(") ").strip()
+
+
+def _row(row: dict[str, str], observation: Observation, units: Units) -> dict[str, Any]:
+    for name in ("x", "y"):
+        if name not in row:
+            raise ValueError(f"{name} is missing.")
+
+    def number(name: str, default: float) -> float:
+        return read_number(name, row[name]) if name in row else default
+
+    pivot = observation.channel_data.pivot
+    flux = units.read_flux(number("flux", 0.0), pivot) if "flux" in row else DEFAULT_FLUX
+    r_half = number("r_half", np.nan)
+    return {
+        "kind": row.get("kind", "point"),
+        "x": number("x", 0.0),
+        "y": number("y", 0.0),
+        "flux": flux,
+        "r_half": DEFAULT_R_HALF
+        if np.isnan(r_half)
+        else units.read_length(r_half, observation.pixel_scale),
+        "ellipticity": number("ellipticity", DEFAULT_ELLIPTICITY),
+        "pa": number("pa", DEFAULT_PA),
+        "n": number("n", np.nan),
+    }

@@ -1,0 +1,279 @@
+"""The list of sources: sortable, editable, in step with the layers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from napari.utils.notifications import show_error, show_info
+from qtpy.QtCore import (
+    QAbstractItemModel,
+    QItemSelection,
+    QItemSelectionModel,
+    QModelIndex,
+    Qt,
+)
+from qtpy.QtGui import QHideEvent, QKeySequence, QShortcut, QShowEvent
+from qtpy.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QComboBox,
+    QFileDialog,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+    QToolTip,
+    QVBoxLayout,
+    QWidget,
+)
+from superqt.utils import qthrottled
+
+from ..catalogue import SUFFIXES, read_sources, write_sources
+from ..sources import KINDS
+from .scene import open_scene
+from .source_columns import COLUMNS, from_text, to_text
+from .source_model import SourceModel
+
+# Milliseconds between two updates during a drag.
+REST = 100
+# Characters that the columns are wide enough for.
+WIDTHS = {"kind": 16, "flux": 18, "counts": 11}
+TABLES = f"Source tables ({' '.join('*' + suffix for suffix in SUFFIXES)})"
+
+
+class SourceList(QWidget):  # type: ignore[misc]
+    """The sources of the live scene as a table.
+
+    Parameters
+    ----------
+    napari_viewer : napari.Viewer
+        The viewer; it gets a scene if it has none.
+    """
+
+    def __init__(self, napari_viewer: Any) -> None:
+        super().__init__()
+        self.scene = open_scene(viewer=napari_viewer, dock=False)
+        self.model = SourceModel(self.scene)
+        self.view = QTableView()
+        self.view.setModel(self.model)
+        self.view.setItemDelegate(_Delegate(self.view))
+        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.view.setSortingEnabled(True)
+        self.view.setWordWrap(False)
+        across, down = self.view.horizontalHeader(), self.view.verticalHeader()
+        across.setSortIndicator(-1, Qt.SortOrder.AscendingOrder)
+        across.setSortIndicatorClearable(True)
+        down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        down.setDefaultSectionSize(self.fontMetrics().height() + 6)
+        down.setToolTip("Number of the source, from 0")
+        character = self.fontMetrics().averageCharWidth()
+        for section, column in enumerate(COLUMNS):
+            self.view.setColumnWidth(section, (WIDTHS.get(column.name, 9)) * character + 14)
+        self.count = QLabel()
+        row = QHBoxLayout()
+        row.addWidget(self.count)
+        row.addStretch(1)
+        for label, tooltip, action in (
+            ("&Undo", "Take back the last edit (Ctrl+Z)", self.scene.undo),
+            ("&Redo", "Do it again (Ctrl+Shift+Z)", self.scene.redo),
+            ("&Copy", "Copy the selected rows as text (Ctrl+C)", self.copy),
+            ("&Paste", "Add sources from text, as of a spreadsheet (Ctrl+V)", self.paste),
+            ("&Delete", "Remove the selected sources (Del)", self.delete),
+            ("&Import…", "Add the sources of a file: ECSV, CSV, FITS", self.load),
+            ("&Export…", "Write the sources to a file: ECSV, CSV, FITS", self.save),
+        ):
+            button = QPushButton(label)
+            button.setToolTip(tooltip)
+            button.clicked.connect(lambda _=False, action=action: action())
+            row.addWidget(button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(4, 2, 4, 4)
+        layout.addWidget(self.view)
+        layout.addLayout(row)
+        for keys, action in (
+            (QKeySequence.StandardKey.Undo, self.scene.undo),
+            (QKeySequence.StandardKey.Redo, self.scene.redo),
+            (QKeySequence.StandardKey.Copy, self.copy),
+            (QKeySequence.StandardKey.Paste, self.paste),
+            (QKeySequence.StandardKey.Delete, self.delete),
+        ):
+            shortcut = QShortcut(QKeySequence(keys), self)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut.activated.connect(action)
+        self.view.selectionModel().selectionChanged.connect(self._rows_selected)
+        self.model.refused.connect(self._tell_refused)
+        self._following = self._selecting = False
+        self._soon = qthrottled(self.refresh, timeout=REST)
+
+    # ---------------------------------------------------------------- list and layers
+
+    def refresh(self) -> None:
+        """Show the sources and the selection as they are now."""
+        if not self._following:
+            return
+        self.model.refresh()
+        self._show_selection()
+
+    def _sources_changed(self, event: Any = None) -> None:
+        self._soon()
+
+    def _show_selection(self, event: Any = None) -> None:
+        """Select in the list what is selected in the layers."""
+        if self._selecting or self.model._seen is None:
+            return
+        rows = self.model.rows_of(self.scene.editor.selected_ids)
+        self.count.setText(_count(len(self.model.source_id), rows.size))
+        chosen = QItemSelection()
+        last = len(COLUMNS) - 1
+        for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
+            if run.size:
+                first, end = self.model.index(int(run[0]), 0), self.model.index(int(run[-1]), last)
+                chosen.select(first, end)
+        self._selecting = True
+        try:
+            flags = QItemSelectionModel.SelectionFlag.ClearAndSelect
+            self.view.selectionModel().select(chosen, flags)
+        finally:
+            self._selecting = False
+        if rows.size == 1 and not self.view.hasFocus():
+            self.view.scrollTo(self.model.index(int(rows[0]), 0))
+
+    def _rows_selected(self, *_: Any) -> None:
+        """Select in the layers what is selected in the list."""
+        if self._selecting:
+            return
+        self._selecting = True
+        try:
+            ids = self.selected_ids()
+            self.scene.editor.select(ids)
+            self.count.setText(_count(len(self.model.source_id), len(ids)))
+        finally:
+            self._selecting = False
+
+    def selected_ids(self) -> list[int]:
+        """Ids of the selected rows, from the top down."""
+        rows = sorted(index.row() for index in self.view.selectionModel().selectedRows())
+        return self.model.ids_of(rows)
+
+    def _tell_refused(self, index: QModelIndex, reason: str) -> None:
+        place = self.view.visualRect(index).bottomLeft()
+        QToolTip.showText(self.view.viewport().mapToGlobal(place), reason, self.view)
+        show_error(reason)
+
+    # ---------------------------------------------------------------- copy, paste, files
+
+    def copy(self) -> None:
+        """Put the selected rows on the clipboard as tab-separated text with all digits."""
+        rows = self.model.order[self.model.rows_of(self.selected_ids())]
+        if rows.size:
+            QApplication.clipboard().setText(to_text(self.model.values, rows, self.scene.units))
+
+    def paste(self) -> None:
+        """Add the sources that the clipboard holds as text."""
+        try:
+            table = from_text(
+                QApplication.clipboard().text(), self.scene.observation, self.scene.units
+            )
+        except ValueError as error:
+            show_error(f"Nothing was pasted: {error}")
+            return
+        self.scene.add(table)
+        self._select_last(len(table))
+
+    def delete(self) -> None:
+        """Remove the selected sources."""
+        self.scene.remove(self.selected_ids())
+
+    def load(self) -> None:
+        """Ask for a file and add its sources; an error changes nothing."""
+        path, _ = QFileDialog.getOpenFileName(self, "Add sources of a file", "", TABLES)
+        if not path:
+            return
+        try:
+            table = read_sources(path)
+            self.scene.add(table)
+        except (OSError, ValueError) as error:
+            show_error(str(error))
+            return
+        self._select_last(len(table))
+        show_info(f"{len(table)} source(s) added from {path}")
+
+    def save(self) -> None:
+        """Ask for a file and write the sources to it; an error is shown."""
+        dialog = QFileDialog(self, "Write the sources", "sources.ecsv", TABLES)
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix("ecsv")
+        if not dialog.exec():
+            return
+        path = dialog.selectedFiles()[0]
+        try:
+            # The dialog has asked before it chose a file that exists.
+            write_sources(self.scene.sources, path, overwrite=True)
+        except (OSError, ValueError) as error:
+            show_error(str(error))
+        else:
+            show_info(f"Saved {path}")
+
+    def _select_last(self, count: int) -> None:
+        self.scene.editor.select(self.scene.editor.source_id[-count:].tolist())
+
+    # ---------------------------------------------------------------- shown and hidden
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Follow the scene while visible (napari gives docked widgets no close event)."""
+        if not self._following:
+            self._following = True
+            events = self.scene.events
+            events.sources.connect(self._sources_changed)
+            events.observation.connect(self._sources_changed)
+            events.picture.connect(self._sources_changed)
+            events.selection.connect(self._show_selection)
+            self.scene.units.events.changed.connect(self._sources_changed)
+            self.refresh()
+        super().showEvent(event)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Cost nothing while hidden."""
+        if self._following:
+            self._following = False
+            events = self.scene.events
+            events.sources.disconnect(self._sources_changed)
+            events.observation.disconnect(self._sources_changed)
+            events.picture.disconnect(self._sources_changed)
+            events.selection.disconnect(self._show_selection)
+            self.scene.units.events.changed.disconnect(self._sources_changed)
+        super().hideEvent(event)
+
+
+class _Delegate(QStyledItemDelegate):  # type: ignore[misc]
+    """Edits kinds with a list of choices, the rest as text."""
+
+    def createEditor(
+        self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
+    ) -> QWidget:
+        if COLUMNS[index.column()].name != "kind":
+            return super().createEditor(parent, option, index)
+        box = QComboBox(parent)
+        box.addItems(KINDS)
+        return box
+
+    def setEditorData(self, editor: QWidget, index: QModelIndex) -> None:
+        if isinstance(editor, QComboBox):
+            editor.setCurrentText(index.data(Qt.ItemDataRole.EditRole))
+        else:
+            super().setEditorData(editor, index)
+
+    def setModelData(self, editor: QWidget, model: QAbstractItemModel, index: QModelIndex) -> None:
+        if isinstance(editor, QComboBox):
+            model.setData(index, editor.currentText())
+        else:
+            super().setModelData(editor, model, index)
+
+
+def _count(sources: int, selected: int) -> str:
+    text = f"{sources} source" if sources == 1 else f"{sources} sources"
+    return f"{text}, {selected} selected" if selected else text
