@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# Share of the brightened pixels, in percent, that stay below the upper limit.
-PERCENTILE = 99.0
+# Share in percent of the brightened pixels that stay below the upper limit.
+PERCENTILES = {"linear": 99.0, "sqrt": 99.0, "snr": 99.5, "asinh": 99.8, "log": 99.8}
 
 
-def contrast_limits(counts: NDArray[Any], background: float) -> tuple[float, float]:
-    """Limits from zero to a percentile of the pixels that the sources brighten.
+def contrast_limits(
+    counts: NDArray[Any], background: float, scale: str = "sqrt"
+) -> tuple[float, float]:
+    """Limits from the sky, or zero, to a percentile of the pixels that the sources brighten.
 
     Parameters
     ----------
@@ -20,13 +22,26 @@ def contrast_limits(counts: NDArray[Any], background: float) -> tuple[float, flo
         Counts per pixel.
     background : float
         Expected sky counts per pixel.
+    scale : str
+        Brightness scale; a logarithm begins at the sky, at least at half a count.
 
     Returns
     -------
     (float, float)
-        Lower and upper limit; the upper one is at least 1 count.
+        Lower and upper limit; the upper one is at least 1 count above the lower.
     """
     bright = counts[counts > background + 5 * np.sqrt(background) + 1]
     chosen = bright if bright.size else counts
-    upper = float(np.percentile(chosen, PERCENTILE)) if chosen.size else 1.0
-    return 0.0, max(upper, 1.0)
+    upper = float(np.percentile(chosen, PERCENTILES[scale])) if chosen.size else 1.0
+    lower = 0.0
+    if scale == "log":
+        lower = max(0.5, background)
+    elif scale == "snr":
+        lower = background
+    return lower, max(upper, lower + 1.0)
+
+
+def symmetric_limits(difference: NDArray[Any]) -> tuple[float, float]:
+    """Limits about zero that hold 99 % of a difference."""
+    widest = float(np.percentile(np.abs(difference), 99.0)) if difference.size else 1.0
+    return -max(widest, 1.0), max(widest, 1.0)

@@ -53,6 +53,10 @@ class Form(QGroupBox):  # type: ignore[misc]
             self._rows.addRow(field)
         return field
 
+    def add_native(self, widget: QWidget) -> None:
+        """Add a row that is one Qt widget."""
+        self._rows.addRow(widget)
+
     def add_text(self, tooltip: str) -> QLabel:
         """Add a row of text that wraps; return the label to write on."""
         text = QLabel()

@@ -42,12 +42,13 @@ ELLIPSES: dict[str, Any] = {
 CANVAS, EDGE, MARKER_WIDTH = 600.0, 1.5, 14.0
 # A click this near (half of it, in pixels of the frame) takes a star; crowded stars need less.
 WIDEST_MARKER = 18.0
+# The brightness scale at first.
+SCALE = "sqrt"
 FRAME_COLOR = "#7a7f88"
 COUNTS: dict[str, Any] = {
     "name": "ISSIS counts",
     "colormap": "gray",
     "interpolation2d": "nearest",
-    "gamma": 0.5,
     **GEOMETRY,
 }
 
