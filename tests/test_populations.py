@@ -55,6 +55,7 @@ def test_a_plummer_cluster_is_drawn_from_the_projected_profile():
 def test_a_gaussian_cluster_is_normal_on_both_axes():
     """Catches a radius that is sigma, or an ellipse turned the other way."""
     table = ni.star_cluster(MANY, profile="gaussian", **SHAPE, seed=2)
+    assert ni.ClusterProfile("gaussian", **SHAPE).scale_radius == pytest.approx(40 / 1.17741)
     for coordinate in along_the_axes(table):
         agrees(coordinate, stats.norm(scale=40 / np.sqrt(2 * np.log(2))).cdf)
 

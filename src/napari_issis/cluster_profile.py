@@ -140,23 +140,23 @@ def _radius_of(fraction: Array, profile: str, concentration: float) -> Array:
     Plummer: the fraction is r^2 / (1 + r^2). Gaussian: 1 - exp(-r^2/2).
     """
     if profile == "plummer":
-        return np.sqrt(fraction / (1 - fraction))
+        return np.asarray(np.sqrt(fraction / (1 - fraction)))
     if profile == "gaussian":
-        return np.sqrt(-2 * np.log1p(-fraction))
+        return np.asarray(np.sqrt(-2 * np.log1p(-fraction)))
     tidal = 10.0**concentration
-    wanted = fraction * _king_number(np.array(tidal), tidal)
+    wanted = fraction * _king_number(np.asarray(tidal), tidal)
     low, high = np.zeros(fraction.shape), np.full(fraction.shape, tidal)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         inside = _king_number(middle, tidal) < wanted
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    return 0.5 * (low + high)
+    return np.asarray(0.5 * (low + high))
 
 
 def _king_number(r: Array, tidal: float) -> Array:
     """Stars inside r, both radii in core radii, but for the factor pi rc^2 k: eq. 18 of King."""
     x, edge = r**2, 1 + tidal**2
-    return np.log1p(x) - 4 * x / (np.sqrt(1 + x) + 1) / sqrt(edge) + x / edge
+    return np.asarray(np.log1p(x) - 4 * x / (np.sqrt(1 + x) + 1) / sqrt(edge) + x / edge)
 
 
 def _number(name: str, value: Any, unit: u.UnitBase = u.dimensionless_unscaled) -> float:

@@ -35,7 +35,7 @@ class NumberField(LineEdit):
         tooltip: str,
         check: Callable[[float], object] | None = None,
     ) -> None:
-        super().__init__(value=_text(value), tooltip=tooltip)
+        super().__init__(value=exact_text(value), tooltip=tooltip)
         self._name, self._help, self._check = name, tooltip, check
         self.changed.connect(self._mark)
 
@@ -49,7 +49,7 @@ class NumberField(LineEdit):
 
     @number.setter
     def number(self, number: float) -> None:
-        self.value = _text(number)
+        self.value = exact_text(number)
 
     def read(self) -> float:
         """Read the number without checking whether it is allowed."""
@@ -101,7 +101,7 @@ def read_number(name: str, text: str) -> float:
     )
 
 
-def _text(number: float) -> str:
+def exact_text(number: float) -> str:
     """Shortest text that reads as exactly this number."""
     short = f"{number:.12g}"
     return short if float(short) == number else repr(number)

@@ -25,6 +25,7 @@ from .marks import MARKER
 from .picking import activate_source_under
 from .picture import HeldSources, Picture, PictureMaker
 from .table import master_table
+from .units import Units
 
 # The live scene of each viewer, kept alive by the viewer's mouse callbacks.
 _SCENES: WeakValueDictionary[int, Scene] = WeakValueDictionary()
@@ -51,11 +52,14 @@ class Scene:
     events : napari.utils.events.EmitterGroup
         ``picture`` after each exposure that came to the screen at rest, ``observation`` after
         a change of the instrument set-up or the seed.
+    units : Units
+        What fluxes and lengths are shown in.
     """
 
     def __init__(self, viewer: Viewer) -> None:
         self.viewer = viewer
         self.events = EmitterGroup(source=self, picture=Event, observation=Event)
+        self.units = Units()
         self.editor = SourceEditor(self._soon)
         self.counts = CountsLayer()
         self._observation = Observation()
