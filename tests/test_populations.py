@@ -180,7 +180,7 @@ def test_galaxies_can_be_clustered_too():
     ("options", "message"),
     [
         ({"n": -1}, "n is -1"),
-        ({"profile": "sersic"}, "profile is 'sersic'; known: plummer, king, gaussian"),
+        ({"profile": "sersic"}, "profile is 'sersic'; known: king, plummer, gaussian"),
         ({"centre": 5}, "centre is 5; give .x, y."),
         ({"centre": (1, 2, 3)}, "give .x, y."),
         ({"centre": (1, np.nan)}, "centre is nan"),
@@ -200,8 +200,8 @@ def test_galaxies_can_be_clustered_too():
         ({"flux_distribution": "normal"}, "flux_distribution is 'normal'"),
         ({"flux_sample": []}, "flux_sample is empty"),
         ({"flux_sample": "bright"}, "flux_sample is 'bright'"),
-        ({"flux_sample": [1e-15, -1e-15]}, "entry 1: -1e-15"),
-        ({"flux_sample": [np.nan]}, "entry 0: nan"),
+        ({"flux_sample": [1e-15, -1e-15]}, "flux_sample: row 1, flux: -1e-15"),
+        ({"flux_sample": [np.nan]}, "flux_sample: row 0, flux: nan"),
         ({"flux_sample": [3] * u.m}, "flux has the unit m"),
     ],
 )

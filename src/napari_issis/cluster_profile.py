@@ -15,7 +15,7 @@ from .sources import FARTHEST
 
 Array = NDArray[np.float64]
 
-PROFILES = ("plummer", "king", "gaussian")
+PROFILES = ("king", "plummer", "gaussian")
 CONCENTRATION_RANGE = (0.0, 4.0)
 # A Plummer star stands 1e4 radii or farther off with a chance of 1e-8.
 LARGEST_RADIUS = 1e-4 * FARTHEST
@@ -29,12 +29,13 @@ class ClusterProfile:
 
     Parameters
     ----------
-    profile : {"plummer", "king", "gaussian"}
+    profile : {"king", "plummer", "gaussian"}
         With r the projected radius, the density is proportional to
 
-        * (1 + r^2/a^2)^-2 (Plummer 1911, MNRAS 71, 460), which never ends;
         * [(1 + r^2/rc^2)^-1/2 - (1 + rt^2/rc^2)^-1/2]^2 inside the tidal radius rt, and 0
           outside (King 1962, AJ 67, 471, eq. 14);
+        * (1 + r^2/a^2)^-2 (Plummer 1911, MNRAS 71, 460), which never ends: of 100 stars one
+          stands farther off than 10 a;
         * exp(-r^2 / 2 sigma^2).
     centre : (float, float)
         x, y of the centre in pixels.
@@ -56,10 +57,10 @@ class ClusterProfile:
         If a value is unknown or out of range; the message names it.
     """
 
-    profile: str = "plummer"
+    profile: str = "king"
     centre: tuple[float, float] = (256.0, 256.0)
     radius: Any = 50.0
-    concentration: float = 1.5
+    concentration: float = 1.0
     ellipticity: float = 0.0
     pa: Any = 0.0
 

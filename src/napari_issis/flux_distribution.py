@@ -5,11 +5,11 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-import astropy.units as u
 import numpy as np
+from astropy.table import QTable
 from numpy.typing import NDArray
 
-from .sources import FLUX_UNIT
+from .sources import FLUX_UNIT, check_sources
 
 Array = NDArray[np.float64]
 
@@ -102,7 +102,7 @@ def sample_fluxes(rng: np.random.Generator, count: int, sample: Any) -> Any:
     Raises
     ------
     ValueError
-        If the list is empty or holds what is no flux; the message names the entry (from 0).
+        If the list is empty or holds what is no flux; the message names the row (from 0).
     """
     unit = getattr(sample, "unit", None) or FLUX_UNIT
     try:
@@ -111,10 +111,10 @@ def sample_fluxes(rng: np.random.Generator, count: int, sample: Any) -> Any:
         raise ValueError(f"flux_sample is {sample!r}; give a list of fluxes.") from None
     if values.size == 0:
         raise ValueError("flux_sample is empty; give at least one flux.")
-    negative = (values < 0) & (not isinstance(unit, u.function.FunctionUnitBase))
-    for entry in np.flatnonzero(~np.isfinite(values) | negative):
-        raise ValueError(
-            f"flux_sample, entry {entry}: {values[entry]:g} is not allowed; "
-            "fluxes are finite and 0 or more."
-        )
+    nowhere = np.zeros(values.size)
+    stars = {"kind": np.full(values.size, "point"), "x": nowhere, "y": nowhere}
+    try:
+        check_sources(QTable({**stars, "flux": values * unit}))
+    except ValueError as error:
+        raise ValueError(f"flux_sample: {error}") from None
     return values[rng.integers(values.size, size=count)] * unit

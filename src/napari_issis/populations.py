@@ -115,10 +115,10 @@ def random_sources(
 def star_cluster(
     n: int,
     *,
-    profile: str = "plummer",
+    profile: str = "king",
     centre: tuple[float, float] = (256.0, 256.0),
     radius: Any = 50.0,
-    concentration: float = 1.5,
+    concentration: float = 1.0,
     ellipticity: float = 0.0,
     pa: Any = 0.0,
     flux: tuple[float, float] = CLUSTER_FLUX,
@@ -134,7 +134,7 @@ def star_cluster(
     n : int
         Number of stars.
     profile, centre, radius, concentration, ellipticity, pa
-        As for `ClusterProfile`: ``plummer``, ``king`` or ``gaussian``; ``radius`` is the
+        As for `ClusterProfile`: ``king``, ``plummer`` or ``gaussian``; ``radius`` is the
         projected half-number radius in pixels (or an angle), ``concentration`` King's
         log10 of tidal over core radius.
     flux, flux_distribution, flux_slope, flux_sample

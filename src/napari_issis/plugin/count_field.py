@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import QSignalBlocker
 from qtpy.QtWidgets import QComboBox
 
-from .number_field import INVALID_STYLE
+INVALID_STYLE = "QComboBox, QComboBox QLineEdit { color: #b00020; background: #ffe3e3; }"
 
 
 class CountField:
@@ -47,13 +46,11 @@ class CountField:
         self.native.setEditText(str(number))
 
     def _mark(self, _text: str) -> None:
-        edit = self.native.lineEdit()
         try:
             _ = self.number
         except ValueError as error:
             style, help_ = INVALID_STYLE, str(error)
         else:
             style, help_ = "", self.tooltip
-        with QSignalBlocker(edit):
-            edit.setStyleSheet(style)
+        self.native.setStyleSheet(style)
         self.native.setToolTip(help_)

@@ -8,6 +8,7 @@ from typing import Any
 
 from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
+from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QFileDialog
 
 from ..flux_distribution import DEFAULT_SLOPE
@@ -24,6 +25,8 @@ CHOICES = (
     ("power law", "power"),
     ("from a table", "table"),
 )
+# Left and right of the text of a button, pixels.
+BUTTON_MARGIN = 16
 
 
 class FluxRows:
@@ -119,12 +122,17 @@ class FluxRows:
             return
         try:
             sample = read_fluxes(path)
-            star_cluster(1, flux_sample=sample)
+            star_cluster(0, flux_sample=sample)
         except (OSError, ValueError) as error:
             show_error(str(error))
             return
         self._sample = sample
-        self.file.text = f"{Path(path).name} ({len(sample)})"
+        button, count = self.file.native, f" ({len(sample)})"
+        metrics = button.fontMetrics()
+        room = button.width() - metrics.horizontalAdvance(count) - BUTTON_MARGIN
+        name = metrics.elidedText(Path(path).name, Qt.TextElideMode.ElideMiddle, max(room, 60))
+        self.file.text = name + count
+        self.file.tooltip = f"{len(sample)} fluxes of {path}; press to choose another table"
 
     def ask_path(self) -> str | None:
         """Ask for the file to read; None if the user changed his mind."""

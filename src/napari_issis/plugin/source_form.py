@@ -27,7 +27,7 @@ from .limit_fields import Limits, QuantityLimits
 from .number_field import NumberField, SeedField
 from .quantity_field import QuantityField
 from .scene import Scene
-from .units import FLUX_LABELS, FluxScale, LengthScale
+from .units import FluxScale, LengthScale
 
 KIND_TEXT = {
     "point": "point (star)",
@@ -40,7 +40,7 @@ MODES = (
     ("random distribution", "random"),
     ("star cluster", "cluster"),
 )
-PROFILES = (("Plummer", "plummer"), ("King", "king"), ("Gaussian", "gaussian"))
+PROFILES = (("King", "king"), ("Plummer", "plummer"), ("Gaussian", "gaussian"))
 CENTRE_HELP = "of the centre, pixels (first pixel: 0)"
 FLUX_HELP = "Flux F, averaged over the channel, or AB magnitude"
 R_HELP = "Semi-major axis of the ellipse that holds half of the light (a pixel is 0.036″)"
@@ -90,12 +90,12 @@ class SourceForm(Form):
 
     def _make_choices(self) -> None:
         self.flux_unit = ComboBox(
-            choices=[(label, unit) for unit, label in FLUX_LABELS.items()],
+            choices=[("Fλ (cgs)", "flux"), ("AB mag", "AB mag")],
             tooltip="Show and type fluxes in erg s⁻¹ cm⁻² Å⁻¹, or as AB magnitudes "
             "at the channel's pivot wavelength",
         )
         self.length_unit = ComboBox(
-            choices=[("pixels", "px"), ("arcsec", "arcsec")],
+            choices=[("px", "px"), ("arcsec", "arcsec")],
             tooltip="Show and type radii in pixels or in arcsec; positions are always in pixels",
         )
         self.mode = ComboBox(
@@ -148,8 +148,8 @@ class SourceForm(Form):
     def _make_cluster(self) -> None:
         self.profile = ComboBox(
             choices=list(PROFILES),
-            tooltip="Projected density of the cluster: Plummer (1911), "
-            "King (1962, ends at the tidal radius), or a Gaussian",
+            tooltip="Projected density of the cluster: King (1962; ends at the tidal radius), "
+            "Plummer (1911; never ends), or a Gaussian",
         )
         self.radius = QuantityField(
             "radius",
@@ -160,8 +160,8 @@ class SourceForm(Form):
         )
         self.concentration = NumberField(
             "concentration",
-            1.5,
-            "King's concentration, log₁₀ of tidal over core radius, 0 to 4; "
+            1.0,
+            "King's concentration c, log₁₀ of tidal over core radius, 0 to 4; "
             "globular clusters have 0.5 to 2.5",
             check=lambda concentration: ClusterProfile(concentration=concentration),
         )
@@ -179,7 +179,9 @@ class SourceForm(Form):
         )
 
     def _lay_out(self) -> None:
-        self.add("&Units", self.flux_unit, self.length_unit)
+        units = self.add("&Units", self.flux_unit, self.length_unit)
+        units.layout().setStretch(0, 5)
+        units.layout().setStretch(1, 4)
         self.add("&Mode", self.mode)
         self._add_row("&Kind", self.kind, modes="specific random")
         self._add_row("Number", self.number, modes="random cluster")
@@ -189,9 +191,10 @@ class SourceForm(Form):
         self._add_row("Ellipticity", self.ellipticity, modes="specific", kinds=EXTENDED)
         self._add_row("PA (°)", self.pa, modes="specific", kinds=EXTENDED)
         self._add_row("Sérsic n", self.n, modes="specific", kinds=SERSIC)
-        self._add_row("Profile", self.profile, modes="cluster")
-        self._concentration_row = self.add("Concentration", self.concentration)
-        self._radius_row = self._add_row("Radius", self.radius, modes="cluster")
+        self._profile_row = self._add_row(
+            "Profile", self.profile, self.concentration, modes="cluster"
+        )
+        self._radius_row = self._add_row("Radius R½", self.radius, modes="cluster")
         self._add_row("ε, PA (°)", self.cluster_ellipticity, self.cluster_pa, modes="cluster")
         self.fluxes = FluxRows(self, "uniform", (1e-15, 1e-14), _is("flux"))
         self.cluster_fluxes = FluxRows(self, "power", CLUSTER_FLUX, _is("flux"))
@@ -252,7 +255,7 @@ class SourceForm(Form):
         for row, name, field in (
             (self._r_row, "R½", self.r_half),
             (self._r_limits_row, "R½", self.r_limits),
-            (self._radius_row, "Radius", self.radius),
+            (self._radius_row, "Radius R½", self.radius),
         ):
             field.show_in(length_scale)
             self.relabel(row, f"{name} ({units.length_label})")
@@ -338,8 +341,9 @@ class SourceForm(Form):
         mode, kind = self.mode.value, self.kind.value
         for row, modes, kinds in self._rows_where:
             self.show_row(row, mode in modes and kind in kinds)
-        king = mode == "cluster" and self.profile.value == "king"
-        self.show_row(self._concentration_row, king)
+        king = self.profile.value == "king"
+        self.concentration.native.setVisible(king)
+        self.relabel(self._profile_row, "Profile, c" if king else "Profile")
         self.fluxes.show(mode == "random")
         self.cluster_fluxes.show(mode == "cluster")
         self._describe_drawn()
