@@ -38,7 +38,7 @@ def test_a_seed_draws_the_population_it_always_drew():
     """Catches draws in another order: scenes that scripts name by their seed would change."""
     row = ni.random_sources("sersic", 3, flux_distribution="log", seed=7)[2]
     assert row["x"] == pytest.approx(396.6510734055391, rel=1e-14)
-    assert row["flux"].value == pytest.approx(6.2671404668733895e-15, rel=1e-14)
+    assert row["flux"].value == pytest.approx(6.2671404668733895e-15, rel=1e-14, abs=0)
     assert row["n"] == pytest.approx(1.2535804438245963, rel=1e-14)
 
 
@@ -127,12 +127,12 @@ def test_a_power_law_is_smooth_through_one_and_safe_far_from_it():
 
     exact = draw_fluxes(np.random.default_rng(6), 1000, LIMITS, "log")
     assert np.array_equal(drawn(1.0), exact)
-    assert drawn(1 + 1e-12) == pytest.approx(exact, rel=1e-10)
+    assert drawn(1 + 1e-12) == pytest.approx(exact, rel=1e-10, abs=0)
     # Below 1 the draw starts from the bright end: the same distribution, mirrored.
     mirrored = LIMITS[0] * LIMITS[1] / exact
-    assert drawn(1 - 1e-12) == pytest.approx(mirrored, rel=1e-10)
+    assert drawn(1 - 1e-12) == pytest.approx(mirrored, rel=1e-10, abs=0)
     for slope, end in ((400.0, LIMITS[0]), (-400.0, LIMITS[1])):
-        assert drawn(slope) == pytest.approx(np.full(1000, end), rel=0.1)
+        assert drawn(slope) == pytest.approx(np.full(1000, end), rel=0.1, abs=0)
 
 
 def test_one_flux_for_all():
@@ -141,7 +141,7 @@ def test_one_flux_for_all():
         table = ni.star_cluster(
             5, flux=(2e-15, 2e-15), flux_distribution=distribution, flux_slope=2, seed=1
         )
-        assert table["flux"].value == pytest.approx(2e-15, rel=1e-14)
+        assert table["flux"].value == pytest.approx(2e-15, rel=1e-14, abs=0)
 
 
 def test_fluxes_are_drawn_from_a_list_each_as_often():
@@ -155,9 +155,10 @@ def test_fluxes_are_drawn_from_a_list_each_as_often():
     pivot = ni.Observation().channel_data.pivot
     fluxes = magnitudes.to(u.erg / u.s / u.cm**2 / u.AA, u.spectral_density(pivot * u.AA))
     same = ni.star_cluster(4000, flux_sample=fluxes, seed=7)
-    assert check_sources(table, pivot=pivot).flux == pytest.approx(same["flux"].value, rel=1e-12)
+    converted = check_sources(table, pivot=pivot).flux
+    assert converted == pytest.approx(same["flux"].value, rel=1e-12, abs=0)
     plain = ni.random_sources("exponential", 5, flux_sample=[3e-15], seed=1)
-    assert plain["flux"].value == pytest.approx(3e-15)
+    assert set(plain["flux"].value) == {3e-15}
     column = QTable({"flux": [3e-15, 4e-15]})["flux"]
     assert set(ni.star_cluster(50, flux_sample=column, seed=1)["flux"].value) == {3e-15, 4e-15}
 
