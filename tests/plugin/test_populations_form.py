@@ -47,7 +47,7 @@ def last_message():
 def test_cluster_defaults_are_the_librarys(form):
     """Catches a form and a library that disagree on what a cluster is."""
     form.mode.value = "cluster"
-    form.profile.value = "king"
+    form.cluster.profile.value = "king"
     assert same_table(form.table(), star_cluster(100, centre=(40, 32), seed=1))
 
 
@@ -56,14 +56,14 @@ def test_every_field_of_a_cluster_is_used(scene, form):
     form.mode.value = "cluster"
     form.number.native.lineEdit().selectAll()
     QTest.keyClicks(form.number.native.lineEdit(), "37")
-    form.profile.value = "king"
+    form.cluster.profile.value = "king"
     for field, text in (
         (form.x, "30"),
         (form.y, "20.5"),
-        (form.concentration, "0.7"),
-        (form.radius, "12"),
-        (form.cluster_ellipticity, "0.3"),
-        (form.cluster_pa, "70"),
+        (form.cluster.concentration, "0.7"),
+        (form.cluster.radius, "12"),
+        (form.cluster.ellipticity, "0.3"),
+        (form.cluster.pa, "70"),
         (form.cluster_fluxes.limits.low, "2e-16"),
         (form.cluster_fluxes.limits.high, "3e-15"),
         (form.cluster_fluxes.slope, "2.5"),
@@ -148,12 +148,12 @@ def test_rows_are_shown_where_they_apply(form):
     form.fluxes.distribution.value = "power"
     assert shown(form) == always | {"Kind", "Number", "Fluxes", flux, "Slope α", "Seed"}
     form.mode.value = "cluster"
-    form.profile.value = "gaussian"
+    form.cluster.profile.value = "gaussian"
     place = {"Number", "x, y (px)", "Radius R½ (px)", "ε, PA (°)", "Fluxes", "Seed"}
     assert shown(form) == always | place | {"Profile", flux, "Slope α"}
-    assert form.concentration.native.isHidden()
-    form.profile.value = "king"
-    assert not form.concentration.native.isHidden()
+    assert form.cluster.concentration.native.isHidden()
+    form.cluster.profile.value = "king"
+    assert not form.cluster.concentration.native.isHidden()
     form.cluster_fluxes.distribution.value = "table"
     form.length_unit.value = "arcsec"
     place = {text.replace("½ (px)", "½ (″)") for text in place}
@@ -275,8 +275,8 @@ def test_the_scenes_units_are_followed_and_set(scene, form):
     form.flux_unit.value = "flux"
     assert (scene.units.length, scene.units.flux) == ("arcsec", "flux")
     form.mode.value = "cluster"
-    enter(form.radius, "0.9")
-    assert form.radius.number == pytest.approx(25.0)
+    enter(form.cluster.radius, "0.9")
+    assert form.cluster.radius.number == pytest.approx(25.0)
     stars = form.table()
     expected = star_cluster(100, centre=(40, 32), radius=25.0, seed=1)["x"]
     assert np.allclose(stars["x"], expected)
@@ -294,12 +294,12 @@ def test_drawn_sources_follow_the_channel_of_a_typed_magnitude(scene, form):
 def test_wrong_cluster_values_are_marked_and_told(scene, form):
     """Catches errors that show only after the button was pressed, or add some sources."""
     form.mode.value = "cluster"
-    form.profile.value = "king"
+    form.cluster.profile.value = "king"
     for field, wrong, right, name in (
-        (form.radius, "0", "10", "radius"),
-        (form.concentration, "9", "1", "concentration"),
-        (form.cluster_ellipticity, "1", "0", "ellipticity"),
-        (form.cluster_pa, "up", "0", "position angle"),
+        (form.cluster.radius, "0", "10", "radius"),
+        (form.cluster.concentration, "9", "1", "concentration"),
+        (form.cluster.ellipticity, "1", "0", "ellipticity"),
+        (form.cluster.pa, "up", "0", "position angle"),
         (form.cluster_fluxes.slope, "1,4", "1.4", "slope"),
         (form.cluster_fluxes.limits.low, "-1", "1e-16", "flux"),
     ):
@@ -332,7 +332,7 @@ def test_everything_fits_the_dock(make_napari_viewer):
         for label in form.findChildren(QLabel):
             if label.isVisible():
                 assert label.width() >= label.sizeHint().width(), label.text()
-        for box in (form.flux_unit, form.length_unit, form.mode, form.number, form.profile):
+        for box in (form.flux_unit, form.length_unit, form.mode, form.number, form.cluster.profile):
             native = box.native
             if native.isVisible():
                 text = native.fontMetrics().horizontalAdvance(native.currentText())
@@ -349,3 +349,37 @@ def test_labels_lead_to_their_fields(form):
     assert sorted(keys) == sorted(set(keys)) == ["K", "M", "U"]
     assert all(label.buddy() is not None for label in form.findChildren(QLabel))
     assert all(label.toolTip() for label in form.findChildren(QLabel))
+
+
+def test_tab_goes_from_row_to_row(form, qtbot):
+    """Catches a Tab key that jumps about, or stops at what is hidden."""
+    form.mode.value = "cluster"
+    form.show()
+    fluxes = form.cluster_fluxes
+    rows = [
+        form.flux_unit,
+        form.length_unit,
+        form.mode,
+        form.number,
+        form.x,
+        form.y,
+        form.cluster.profile,
+        form.cluster.concentration,
+        form.cluster.radius,
+        form.cluster.ellipticity,
+        form.cluster.pa,
+        fluxes.distribution,
+        fluxes.limits.low,
+        fluxes.limits.high,
+        fluxes.slope,
+        form.seed,
+    ]
+    chain, widget = [], form
+    for _ in range(200):
+        widget = widget.nextInFocusChain()
+        if widget is form:
+            break
+        if widget.isVisibleTo(form) and widget.focusPolicy() & Qt.FocusPolicy.TabFocus:
+            chain.append(widget)
+    fields = [row.native for row in rows]
+    assert [widget for widget in chain if widget in fields] == fields

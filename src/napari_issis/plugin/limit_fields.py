@@ -90,6 +90,8 @@ class QuantityLimits:
 
     def show_in(self, scale: Scale) -> None:
         """Convert both to another scale."""
+        if scale == self._scale:
+            return
         try:
             low, high = self.low.number, self.high.number
         except ValueError:

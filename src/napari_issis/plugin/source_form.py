@@ -10,7 +10,6 @@ from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
 from qtpy.QtWidgets import QWidget
 
-from ..cluster_profile import ClusterProfile
 from ..populations import CLUSTER_FLUX, random_sources, star_cluster
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -20,6 +19,7 @@ from ..sources import (
     KINDS,
     source,
 )
+from .cluster_rows import ClusterRows
 from .count_field import CountField
 from .flux_rows import FluxRows
 from .form import Field, Form
@@ -40,18 +40,12 @@ MODES = (
     ("random distribution", "random"),
     ("star cluster", "cluster"),
 )
-PROFILES = (("King", "king"), ("Plummer", "plummer"), ("Gaussian", "gaussian"))
-CENTRE_HELP = "of the centre, pixels (first pixel: 0)"
 FLUX_HELP = "Flux F, averaged over the channel, or AB magnitude"
 R_HELP = "Semi-major axis of the ellipse that holds half of the light (a pixel is 0.036″)"
 E_HELP = "Ellipticity 1 − b/a, from 0 to below 1"
 PA_HELP = "Position angle of the major axis, degrees from up, counter-clockwise"
 N_HELP = "Sérsic index, 0.5 to 8"
-RADIUS_HELP = (
-    "Projected half-number radius: semi-major axis of the ellipse that holds half of the stars "
-    "(a pixel is 0.036″)"
-)
-# Which modes a row belongs to, and which kinds of sources.
+# Kinds of sources that a row applies to.
 ALL_KINDS = frozenset(KINDS)
 EXTENDED = ALL_KINDS - {"point"}
 SERSIC = frozenset({"sersic"})
@@ -73,7 +67,6 @@ class SourceForm(Form):
         self._make_choices()
         self._make_object()
         self._make_population()
-        self._make_cluster()
         self._lay_out()
         self._centre = self.x.value, self.y.value
         self.show_centre()
@@ -145,39 +138,6 @@ class SourceForm(Form):
             "Type one again to have its population again",
         )
 
-    def _make_cluster(self) -> None:
-        self.profile = ComboBox(
-            choices=list(PROFILES),
-            tooltip="Projected density of the cluster: King (1962; ends at the tidal radius), "
-            "Plummer (1911; never ends), or a Gaussian",
-        )
-        self.radius = QuantityField(
-            "radius",
-            50.0,
-            RADIUS_HELP,
-            LengthScale(),
-            check=lambda radius: ClusterProfile(radius=radius),
-        )
-        self.concentration = NumberField(
-            "concentration",
-            1.0,
-            "King's concentration c, log₁₀ of tidal over core radius, 0 to 4; "
-            "globular clusters have 0.5 to 2.5",
-            check=lambda concentration: ClusterProfile(concentration=concentration),
-        )
-        self.cluster_ellipticity = NumberField(
-            "ellipticity of the cluster",
-            0.0,
-            "Ellipticity of the cluster, 1 − b/a, from 0 to below 1",
-            _is("ellipticity"),
-        )
-        self.cluster_pa = NumberField(
-            "position angle of the cluster",
-            0.0,
-            "Position angle of the cluster's major axis, degrees from up, counter-clockwise",
-            _is("pa"),
-        )
-
     def _lay_out(self) -> None:
         units = self.add("&Units", self.flux_unit, self.length_unit)
         units.layout().setStretch(0, 5)
@@ -191,11 +151,7 @@ class SourceForm(Form):
         self._add_row("Ellipticity", self.ellipticity, modes="specific", kinds=EXTENDED)
         self._add_row("PA (°)", self.pa, modes="specific", kinds=EXTENDED)
         self._add_row("Sérsic n", self.n, modes="specific", kinds=SERSIC)
-        self._profile_row = self._add_row(
-            "Profile", self.profile, self.concentration, modes="cluster"
-        )
-        self._radius_row = self._add_row("Radius R½", self.radius, modes="cluster")
-        self._add_row("ε, PA (°)", self.cluster_ellipticity, self.cluster_pa, modes="cluster")
+        self.cluster = ClusterRows(self)
         self.fluxes = FluxRows(self, "uniform", (1e-15, 1e-14), _is("flux"))
         self.cluster_fluxes = FluxRows(self, "power", CLUSTER_FLUX, _is("flux"))
         self._r_limits_row = self._add_limits("R½", self.r_limits, EXTENDED)
@@ -203,7 +159,6 @@ class SourceForm(Form):
         self._add_limits("PA (°)", self.pa_limits, EXTENDED)
         self._add_limits("Sérsic n", self.n_limits, SERSIC)
         self._add_row("Seed", self.seed, modes="random cluster")
-        self.profile.changed.connect(self._show_fields)
 
     def _add_row(
         self, label: str, *widgets: Field, modes: str, kinds: frozenset[str] = ALL_KINDS
@@ -255,10 +210,10 @@ class SourceForm(Form):
         for row, name, field in (
             (self._r_row, "R½", self.r_half),
             (self._r_limits_row, "R½", self.r_limits),
-            (self._radius_row, "Radius R½", self.radius),
         ):
             field.show_in(length_scale)
             self.relabel(row, f"{name} ({units.length_label})")
+        self.cluster.show_in(length_scale, units.length_label)
         self._describe_drawn()
 
     def table(self) -> QTable:
@@ -272,7 +227,13 @@ class SourceForm(Form):
         if self.mode.value == "specific":
             return source(x=self.x.number, y=self.y.number, **self._one())
         if self.mode.value == "cluster":
-            return self._cluster()
+            return star_cluster(
+                self.number.number,
+                centre=(self.x.number, self.y.number),
+                seed=self.seed.number,
+                **self.cluster.options(),
+                **self.cluster_fluxes.options(),
+            )
         kind = self.kind.value
         ranges: dict[str, Any] = {}
         if kind != "point":
@@ -290,21 +251,6 @@ class SourceForm(Form):
             seed=self.seed.number,
             **self.fluxes.options(),
             **ranges,
-        )
-
-    def _cluster(self) -> QTable:
-        options = self.cluster_fluxes.options()
-        if self.profile.value == "king":
-            options["concentration"] = self.concentration.number
-        return star_cluster(
-            self.number.number,
-            profile=self.profile.value,
-            centre=(self.x.number, self.y.number),
-            radius=self.radius.number,
-            ellipticity=self.cluster_ellipticity.number,
-            pa=self.cluster_pa.number,
-            seed=self.seed.number,
-            **options,
         )
 
     def add_sources(self, event: Any = None) -> None:
@@ -341,9 +287,7 @@ class SourceForm(Form):
         mode, kind = self.mode.value, self.kind.value
         for row, modes, kinds in self._rows_where:
             self.show_row(row, mode in modes and kind in kinds)
-        king = self.profile.value == "king"
-        self.concentration.native.setVisible(king)
-        self.relabel(self._profile_row, "Profile, c" if king else "Profile")
+        self.cluster.show(mode == "cluster")
         self.fluxes.show(mode == "random")
         self.cluster_fluxes.show(mode == "cluster")
         self._describe_drawn()
