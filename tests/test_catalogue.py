@@ -97,7 +97,7 @@ def test_a_fits_table_of_another_program(tmp_path):
     back = read_sources(tmp_path / "x.fits")
     # F_lambda = F_nu c / lambda^2, 1 mJy at 2500 A
     expected = 1e-26 * 2.99792458e18 / 2500**2
-    assert check_sources(back).flux[0] == pytest.approx(expected)
+    assert check_sources(back).flux[0] == pytest.approx(expected, rel=1e-12, abs=0)
 
 
 GOOD = "kind,x,y,flux,r_half,ellipticity,pa\nexponential,1,2,1e-14,20,0.5,45\n"

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .cluster_profile import ClusterProfile
 from .drag import Drag
 from .exposure import Exposure, simulate
 from .image_psf import ImagePSF
 from .limits import CountRateWarning
 from .observation import Observation
+from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
-from .sources import random_sources, source
+from .sources import source
 
 if TYPE_CHECKING:
     from astropy.table import Table
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "ClusterProfile",
     "CountRateWarning",
     "Drag",
     "Exposure",
@@ -35,6 +38,7 @@ __all__ = [
     "show",
     "simulate",
     "source",
+    "star_cluster",
 ]
 
 

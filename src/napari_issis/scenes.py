@@ -17,7 +17,8 @@ from .fits_io import read_exposure
 from .fits_table import open_fits
 from .instrument import PIXEL_SCALE
 from .observation import Observation
-from .sources import random_sources, source
+from .populations import random_sources
+from .sources import source
 
 
 @dataclass(frozen=True)

@@ -119,91 +119,6 @@ def source(
     return table
 
 
-def random_sources(
-    kind: str,
-    n: int,
-    *,
-    shape: tuple[int, int] = (512, 512),
-    flux: tuple[float, float] = (1e-15, 1e-14),
-    r_half: tuple[float, float] = (10.0, 30.0),
-    ellipticity: tuple[float, float] = (0.0, 0.8),
-    pa: tuple[float, float] = (0.0, 180.0),
-    index: tuple[float, float] = (0.5, 4.0),
-    flux_distribution: str = "uniform",
-    seed: int | None = None,
-) -> QTable:
-    """Draw a random population; the default ranges are the paper's.
-
-    Parameters
-    ----------
-    kind : str
-        As for `source`.
-    n : int
-        Number of sources.
-    shape : (int, int)
-        Frame ``(ny, nx)`` over which the positions are uniform.
-    flux : (float, float)
-        Limits in erg s-1 cm-2 A-1.
-    r_half, ellipticity, pa : (float, float)
-        Limits of the structure parameters (pixels, 1, degrees), each uniform between them.
-    index : (float, float)
-        Limits of the Sersic index, for kind ``sersic`` only.
-    flux_distribution : {"uniform", "log"}
-        Uniform in flux, or in its logarithm.
-    seed : int, optional
-        Seed; the same one draws the same population.
-
-    Returns
-    -------
-    astropy.table.QTable
-
-    Raises
-    ------
-    ValueError
-        If a limit is out of range or a pair is in the wrong order.
-    """
-    if isinstance(n, bool) or not hasattr(n, "__index__") or n < 0:
-        raise ValueError(f"n is {n!r}; the number of sources is a whole number, 0 or more.")
-    if kind not in KINDS:
-        raise ValueError(f"kind is {kind!r}; known: {', '.join(KINDS)}.")
-    if flux_distribution not in ("uniform", "log"):
-        raise ValueError(f"flux_distribution is {flux_distribution!r}; it is 'uniform' or 'log'.")
-    try:
-        ny, nx = (int(side) for side in shape)
-    except (TypeError, ValueError):
-        raise ValueError(f"shape is {shape!r}; give (ny, nx) in pixels.") from None
-    if ny < 1 or nx < 1:
-        raise ValueError(f"shape is {shape!r}; its sides must be 1 or more.")
-    rng = np.random.default_rng(seed)
-    count = int(n)
-    x = rng.uniform(-0.5, nx - 0.5, count)
-    y = rng.uniform(-0.5, ny - 0.5, count)
-    low, high = _limits("flux", flux, 0.0, np.inf)
-    if flux_distribution == "log":
-        if low <= 0:
-            raise ValueError(f"flux limits are {flux}; a log-uniform flux needs them above zero.")
-        fluxes = np.clip(np.exp(rng.uniform(np.log(low), np.log(high), count)), low, high)
-    else:
-        fluxes = rng.uniform(low, high, count)
-    table = QTable(
-        {
-            "kind": np.full(count, kind, dtype="U13"),
-            "x": x,
-            "y": y,
-            "flux": fluxes * FLUX_UNIT,
-            "r_half": rng.uniform(*_limits("r_half", r_half, 0.0, np.inf), count) * u.pix,
-            "ellipticity": rng.uniform(
-                *_limits("ellipticity", ellipticity, 0.0, np.nextafter(1.0, 0.0)), count
-            ),
-            "pa": rng.uniform(*_limits("pa", pa, -np.inf, np.inf), count) * u.deg,
-        }
-    )
-    if kind == "sersic":
-        table["n"] = rng.uniform(*_limits("index", index, *INDEX_RANGE), count)
-    check_sources(table)
-    return table
-
-
 def check_sources(
     table: Table, *, pivot: float | None = None, pixel_scale: float = PIXEL_SCALE
 ) -> SourceArrays:
@@ -282,7 +197,7 @@ def check_sources(
 
 def empty_sources() -> QTable:
     """Make a source table with no rows."""
-    return random_sources("point", 0)
+    return source("point", 0.0, 0.0)[:0]
 
 
 def _plain(name: str, value: Any, unit: u.UnitBase) -> float:
@@ -297,20 +212,6 @@ def _plain(name: str, value: Any, unit: u.UnitBase) -> float:
 
 def _with_unit(name: str, value: Any, unit: u.UnitBase) -> Any:
     return value if hasattr(value, "unit") else _plain(name, value, unit) * unit
-
-
-def _limits(name: str, pair: Any, least: float, most: float) -> tuple[float, float]:
-    try:
-        low, high = (float(v) for v in pair)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} is {pair!r}; give (lower, upper).") from None
-    if not (np.isfinite(low) and np.isfinite(high)):
-        raise ValueError(f"{name} limits are ({low}, {high}); they must be finite.")
-    if low > high:
-        raise ValueError(f"{name} limits are ({low}, {high}); the lower exceeds the upper one.")
-    if low < least or high > most:
-        raise ValueError(f"{name} limits are ({low}, {high}); allowed is {least} to {most}.")
-    return low, high
 
 
 def _column(

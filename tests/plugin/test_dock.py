@@ -63,7 +63,7 @@ def test_every_kind_and_mode_can_be_added(scene, form):
         form.mode.value = "specific"
         form.button.native.click()
         form.mode.value = "random"
-        form.number.value = 10
+        form.number.number = 10
         form.button.native.click()
     kinds, numbers = np.unique(scene.sources["kind"][4:], return_counts=True)
     assert list(numbers) == [11] * 6

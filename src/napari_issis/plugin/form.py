@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
-from magicgui.widgets.bases import ValueWidget
 from qtpy.QtCore import QEvent, QObject, Qt
 from qtpy.QtWidgets import (
     QComboBox,
@@ -15,6 +14,18 @@ from qtpy.QtWidgets import (
     QSizePolicy,
     QWidget,
 )
+
+
+class Field(Protocol):
+    """What a row holds: a magicgui widget, or what looks like one."""
+
+    @property
+    def native(self) -> Any:
+        """The Qt widget."""
+
+    @property
+    def tooltip(self) -> str | None:
+        """What it is for."""
 
 
 class Form(QGroupBox):  # type: ignore[misc]
@@ -29,8 +40,11 @@ class Form(QGroupBox):  # type: ignore[misc]
         self._rows.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         self._rows.setLabelAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 
-    def add(self, label: str, *widgets: ValueWidget[Any]) -> QWidget:
-        """Add a row; return the field, which `show_row` shows or hides."""
+    def add(self, label: str, *widgets: Field) -> QWidget:
+        """Add a row; return the field, which `show_row` shows or hides.
+
+        An ampersand in the label marks the key that, with Alt, goes to the first widget.
+        """
         for widget in widgets:
             _narrow(widget.native)
             widget.native.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -66,6 +80,12 @@ class Form(QGroupBox):  # type: ignore[misc]
         text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._rows.addRow(text)
         return text
+
+    def relabel(self, field: QWidget, text: str) -> None:
+        """Write another label on a row."""
+        label = self._rows.labelForField(field)
+        if label is not None:
+            label.setText(text)
 
     def show_row(self, field: QWidget, visible: bool) -> None:
         """Show or hide a row with its label."""

@@ -1,7 +1,8 @@
-"""The form that adds sources: one with given parameters, or a random population."""
+"""The form that adds sources: one with given parameters, a random population, or a cluster."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from astropy.table import QTable
@@ -9,18 +10,24 @@ from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
 from qtpy.QtWidgets import QWidget
 
+from ..populations import CLUSTER_FLUX, random_sources, star_cluster
 from ..sources import (
     DEFAULT_ELLIPTICITY,
     DEFAULT_FLUX,
     DEFAULT_PA,
     DEFAULT_R_HALF,
     KINDS,
-    random_sources,
     source,
 )
-from .form import Form
+from .cluster_rows import ClusterRows
+from .count_field import CountField
+from .flux_rows import FluxRows
+from .form import Field, Form
+from .limit_fields import Limits, QuantityLimits
 from .number_field import NumberField, SeedField
+from .quantity_field import QuantityField
 from .scene import Scene
+from .units import FluxScale, LengthScale
 
 KIND_TEXT = {
     "point": "point (star)",
@@ -28,25 +35,20 @@ KIND_TEXT = {
     "gaussian": "Gaussian",
     "sersic": "Sérsic",
 }
-FLUX_LABEL = "F (erg/s/cm²/Å)"
-FLUX_HELP = "Flux F in erg s⁻¹ cm⁻² Å⁻¹, averaged over the channel"
-R_HELP = "Semi-major axis of the ellipse that holds half of the light, pixels (0.036″ each)"
+MODES = (
+    ("specific object", "specific"),
+    ("random distribution", "random"),
+    ("star cluster", "cluster"),
+)
+FLUX_HELP = "Flux F, averaged over the channel, or AB magnitude"
+R_HELP = "Semi-major axis of the ellipse that holds half of the light (a pixel is 0.036″)"
 E_HELP = "Ellipticity 1 − b/a, from 0 to below 1"
 PA_HELP = "Position angle of the major axis, degrees from up, counter-clockwise"
 N_HELP = "Sérsic index, 0.5 to 8"
-
-
-class Limits:
-    """Lower and upper limit of a quantity, typed as numbers."""
-
-    def __init__(self, name: str, label: str, low: float, high: float, tooltip: str) -> None:
-        self.low = _field(name, low, f"Lower limit. {tooltip}", f"{label}, lower limit")
-        self.high = _field(name, high, f"Upper limit. {tooltip}", f"{label}, upper limit")
-
-    @property
-    def numbers(self) -> tuple[float, float]:
-        """The limits."""
-        return self.low.number, self.high.number
+# Kinds of sources that a row applies to.
+ALL_KINDS = frozenset(KINDS)
+EXTENDED = ALL_KINDS - {"point"}
+SERSIC = frozenset({"sersic"})
 
 
 class SourceForm(Form):
@@ -61,96 +63,158 @@ class SourceForm(Form):
     def __init__(self, scene: Scene) -> None:
         super().__init__("Add sources")
         self.scene = scene
-        self.kind = ComboBox(
-            choices=[(KIND_TEXT.get(kind, kind), kind) for kind in KINDS],
-            value="exponential",
-            tooltip="Profile; also that of ellipses drawn by hand",
-        )
-        self.mode = ComboBox(
-            choices=[("specific object", "specific"), ("random distribution", "random")],
-            value="specific",
-            tooltip="One source with these parameters, or a random population over the frame",
-        )
-        self.x = _field("x", 256.0, "x, column of the centre, pixels (first pixel: 0)")
-        self.y = _field("y", 256.0, "y, row of the centre, pixels (first pixel: 0)")
-        self.flux = _field("flux", DEFAULT_FLUX, FLUX_HELP)
-        self.r_half = _field("r_half", DEFAULT_R_HALF, R_HELP)
-        self.ellipticity = _field("ellipticity", DEFAULT_ELLIPTICITY, E_HELP)
-        self.pa = _field("pa", DEFAULT_PA, PA_HELP)
-        self.n = _field("n", 2.0, N_HELP)
-
-        self.number = ComboBox(choices=[1, 10, 100], value=100, tooltip="Number of sources")
-        self.distribution = ComboBox(
-            choices=["uniform", "log"],
-            tooltip="Fluxes uniform between the limits, or their logarithms",
-        )
-        self.flux_limits = Limits("flux", "flux", 1e-15, 1e-14, FLUX_HELP)
-        self.r_limits = Limits("r_half", "half-light radius", 10, 30, R_HELP)
-        self.e_limits = Limits("ellipticity", "ellipticity", 0, 0.8, E_HELP)
-        self.pa_limits = Limits("pa", "position angle", 0, 180, PA_HELP)
-        self.n_limits = Limits("n", "Sersic index", 0.5, 4, N_HELP)
-        self.seed = SeedField(
-            "seed",
-            1,
-            "Seed of the population; goes up by one with each, so that none is repeated",
-        )
-        # The dock shows it below the forms, where it is never scrolled out of sight.
-        self.button = PushButton(text="&Add source(s)", tooltip="Add to the scene")
-
-        self.add("Kind", self.kind)
-        self.add("Mode", self.mode)
-        self._rows_of = {
-            ("specific", "all"): [
-                self.add("x, y (px)", self.x, self.y),
-                self.add(FLUX_LABEL, self.flux),
-            ],
-            ("specific", "extended"): [
-                self.add("R½ (px)", self.r_half),
-                self.add("Ellipticity", self.ellipticity),
-                self.add("PA (°)", self.pa),
-            ],
-            ("specific", "sersic"): [self.add("Sérsic n", self.n)],
-            ("random", "all"): [
-                self.add("Number", self.number),
-                self.add("Distribution", self.distribution),
-                self._add_limits(FLUX_LABEL, self.flux_limits),
-            ],
-            ("random", "extended"): [
-                self._add_limits("R½ (px)", self.r_limits),
-                self._add_limits("Ellipticity", self.e_limits),
-                self._add_limits("PA (°)", self.pa_limits),
-            ],
-            ("random", "sersic"): [self._add_limits("Sérsic n", self.n_limits)],
-        }
-        self._rows_of["random", "all"].append(self.add("Seed", self.seed))
+        self._rows_where: list[tuple[QWidget, frozenset[str], frozenset[str]]] = []
+        self._make_choices()
+        self._make_object()
+        self._make_population()
+        self._lay_out()
         self._centre = self.x.value, self.y.value
         self.show_centre()
+        self.show_units()
 
         for widget in (self.mode, self.kind):
             widget.changed.connect(self._show_fields)
         for field in (self.flux, self.r_half, self.ellipticity, self.pa, self.n):
             field.changed.connect(self._describe_drawn)
+        self.flux_unit.changed.connect(lambda unit: setattr(self.scene.units, "flux", unit))
+        self.length_unit.changed.connect(lambda unit: setattr(self.scene.units, "length", unit))
         self.button.changed.connect(self.add_sources)
         self._show_fields()
 
+    def _make_choices(self) -> None:
+        self.flux_unit = ComboBox(
+            choices=[("Fλ (cgs)", "flux"), ("AB mag", "AB mag")],
+            tooltip="Show and type fluxes in erg s⁻¹ cm⁻² Å⁻¹, or as AB magnitudes "
+            "at the channel's pivot wavelength",
+        )
+        self.length_unit = ComboBox(
+            choices=[("px", "px"), ("arcsec", "arcsec")],
+            tooltip="Show and type radii in pixels or in arcsec; positions are always in pixels",
+        )
+        self.mode = ComboBox(
+            choices=list(MODES),
+            value="specific",
+            tooltip="One source with these parameters, a random population over the frame, "
+            "or the stars of a cluster",
+        )
+        self.kind = ComboBox(
+            choices=[(KIND_TEXT.get(kind, kind), kind) for kind in KINDS],
+            value="exponential",
+            tooltip="Profile; also that of ellipses drawn by hand",
+        )
+        # The dock shows it below the forms, where it is never scrolled out of sight.
+        self.button = PushButton(text="&Add source(s)", tooltip="Add to the scene")
+
+    def _make_object(self) -> None:
+        self.x = NumberField(
+            "x", 256.0, "x, column of the centre, pixels (first pixel: 0)", _is("x")
+        )
+        self.y = NumberField("y", 256.0, "y, row of the centre, pixels (first pixel: 0)", _is("y"))
+        self.flux = QuantityField("flux", DEFAULT_FLUX, FLUX_HELP, FluxScale(), _is("flux"))
+        self.r_half = QuantityField("r_half", DEFAULT_R_HALF, R_HELP, LengthScale(), _is("r_half"))
+        self.ellipticity = NumberField(
+            "ellipticity", DEFAULT_ELLIPTICITY, E_HELP, _is("ellipticity")
+        )
+        self.pa = NumberField("pa", DEFAULT_PA, PA_HELP, _is("pa"))
+        self.n = NumberField("n", 2.0, N_HELP, _is("n"))
+
+    def _make_population(self) -> None:
+        self.number = CountField(
+            "number of sources",
+            100,
+            (1, 10, 100),
+            "Number of sources: type any, or choose one of the list",
+        )
+        self.r_limits = QuantityLimits(
+            "half-light radius", 10, 30, R_HELP, LengthScale(), _is("r_half")
+        )
+        self.e_limits = Limits("ellipticity", 0, 0.8, E_HELP, _is("ellipticity"))
+        self.pa_limits = Limits("position angle", 0, 180, PA_HELP, _is("pa"))
+        self.n_limits = Limits("Sersic index", 0.5, 4, N_HELP, _is("n"))
+        self.seed = SeedField(
+            "seed",
+            1,
+            "Seed of the population; goes up by one with each, so that none is repeated. "
+            "Type one again to have its population again",
+        )
+
+    def _lay_out(self) -> None:
+        units = self.add("&Units", self.flux_unit, self.length_unit)
+        units.layout().setStretch(0, 5)
+        units.layout().setStretch(1, 4)
+        self.add("&Mode", self.mode)
+        self._add_row("&Kind", self.kind, modes="specific random")
+        self._add_row("Number", self.number, modes="random cluster")
+        self._add_row("x, y (px)", self.x, self.y, modes="specific cluster")
+        self._flux_row = self._add_row("F", self.flux, modes="specific")
+        self._r_row = self._add_row("R½", self.r_half, modes="specific", kinds=EXTENDED)
+        self._add_row("Ellipticity", self.ellipticity, modes="specific", kinds=EXTENDED)
+        self._add_row("PA (°)", self.pa, modes="specific", kinds=EXTENDED)
+        self._add_row("Sérsic n", self.n, modes="specific", kinds=SERSIC)
+        self.cluster = ClusterRows(self)
+        self.fluxes = FluxRows(self, "uniform", (1e-15, 1e-14), _is("flux"))
+        self.cluster_fluxes = FluxRows(self, "power", CLUSTER_FLUX, _is("flux"))
+        self._r_limits_row = self._add_limits("R½", self.r_limits, EXTENDED)
+        self._add_limits("Ellipticity", self.e_limits, EXTENDED)
+        self._add_limits("PA (°)", self.pa_limits, EXTENDED)
+        self._add_limits("Sérsic n", self.n_limits, SERSIC)
+        self._add_row("Seed", self.seed, modes="random cluster")
+
+    def _add_row(
+        self, label: str, *widgets: Field, modes: str, kinds: frozenset[str] = ALL_KINDS
+    ) -> QWidget:
+        row = self.add(label, *widgets)
+        self._rows_where.append((row, frozenset(modes.split()), kinds))
+        return row
+
+    def _add_limits(
+        self, label: str, limits: Limits | QuantityLimits, kinds: frozenset[str]
+    ) -> QWidget:
+        return self._add_row(label, limits.low, limits.high, modes="random", kinds=kinds)
+
     def resume(self) -> None:
-        """Follow the scene's frame."""
-        self.scene.events.observation.connect(self.show_centre)
-        self.show_centre()
+        """Follow the scene's frame, channel and units."""
+        self.scene.events.observation.connect(self.show_observation)
+        self.scene.units.events.changed.connect(self.show_units)
+        self.show_observation()
 
     def pause(self) -> None:
         """Stop following the scene."""
-        self.scene.events.observation.disconnect(self.show_centre)
+        self.scene.events.observation.disconnect(self.show_observation)
+        self.scene.units.events.changed.disconnect(self.show_units)
 
-    def show_centre(self, event: Any = None) -> None:
+    def show_observation(self, event: Any = None) -> None:
+        """Follow the frame, and the channel at whose wavelength magnitudes are."""
+        self.show_centre()
+        self.show_units()
+
+    def show_centre(self) -> None:
         """Offer the centre of the frame as the place of the next source, unless one was typed."""
         ny, nx = self.scene.observation.shape
         if (self.x.value, self.y.value) == self._centre:
             self.x.number, self.y.number = nx // 2, ny // 2
             self._centre = self.x.value, self.y.value
 
-    def _add_limits(self, label: str, limits: Limits) -> QWidget:
-        return self.add(label, limits.low, limits.high)
+    def show_units(self, event: Any = None) -> None:
+        """Convert all fluxes and lengths to the scene's units."""
+        units, observation = self.scene.units, self.scene.observation
+        for box, unit in ((self.flux_unit, units.flux), (self.length_unit, units.length)):
+            with box.changed.blocked():
+                box.value = unit
+        flux_scale = units.flux_scale(observation.channel_data.pivot)
+        length_scale = units.length_scale(observation.pixel_scale)
+        self.flux.show_in(flux_scale)
+        self.relabel(self._flux_row, f"F ({units.flux_label})")
+        for rows in (self.fluxes, self.cluster_fluxes):
+            rows.show_in(flux_scale, units.flux_label)
+        for row, name, field in (
+            (self._r_row, "R½", self.r_half),
+            (self._r_limits_row, "R½", self.r_limits),
+        ):
+            field.show_in(length_scale)
+            self.relabel(row, f"{name} ({units.length_label})")
+        self.cluster.show_in(length_scale, units.length_label)
+        self._describe_drawn()
 
     def table(self) -> QTable:
         """Return the sources that the form describes.
@@ -160,9 +224,17 @@ class SourceForm(Form):
         ValueError
             If a value is no number or out of range.
         """
-        kind = self.kind.value
         if self.mode.value == "specific":
             return source(x=self.x.number, y=self.y.number, **self._one())
+        if self.mode.value == "cluster":
+            return star_cluster(
+                self.number.number,
+                centre=(self.x.number, self.y.number),
+                seed=self.seed.number,
+                **self.cluster.options(),
+                **self.cluster_fluxes.options(),
+            )
+        kind = self.kind.value
         ranges: dict[str, Any] = {}
         if kind != "point":
             ranges.update(
@@ -174,11 +246,10 @@ class SourceForm(Form):
             ranges["index"] = self.n_limits.numbers
         return random_sources(
             kind,
-            self.number.value,
+            self.number.number,
             shape=self.scene.observation.shape,
-            flux=self.flux_limits.numbers,
-            flux_distribution=self.distribution.value,
             seed=self.seed.number,
+            **self.fluxes.options(),
             **ranges,
         )
 
@@ -189,7 +260,7 @@ class SourceForm(Form):
         except ValueError as error:
             show_error(str(error))
             return
-        if self.mode.value == "random":
+        if self.mode.value != "specific":
             self.seed.number += 1
 
     def _one(self) -> dict[str, Any]:
@@ -213,20 +284,16 @@ class SourceForm(Form):
         self.scene.new_source = {**self.scene.new_source, "n": None, **one}
 
     def _show_fields(self, event: Any = None) -> None:
-        kind = self.kind.value
-        applies = {"all": True, "extended": kind != "point", "sersic": kind == "sersic"}
-        for (mode, kinds), rows in self._rows_of.items():
-            for row in rows:
-                self.show_row(row, mode == self.mode.value and applies[kinds])
+        mode, kind = self.mode.value, self.kind.value
+        for row, modes, kinds in self._rows_where:
+            self.show_row(row, mode in modes and kind in kinds)
+        self.cluster.show(mode == "cluster")
+        self.fluxes.show(mode == "random")
+        self.cluster_fluxes.show(mode == "cluster")
         self._describe_drawn()
 
 
-def _field(name: str, value: float, tooltip: str, label: str = "") -> NumberField:
-    """Make a field for one of the numbers of `source`, with its limits."""
+def _is(name: str) -> Callable[[float], object]:
+    """Make a check that a number is allowed as one of the arguments of `source`."""
     default: dict[str, Any] = {"x": 0.0, "y": 0.0, "n": 2.0}
-    return NumberField(
-        label or name,
-        value,
-        tooltip,
-        check=lambda number: source("sersic", **{**default, name: number}),
-    )
+    return lambda number: source("sersic", **{**default, name: number})
