@@ -49,13 +49,14 @@ class Scene:
     Attributes
     ----------
     events : napari.utils.events.EmitterGroup
-        ``picture`` after each exposure that came to the screen at rest, ``observation`` after
-        a change of the instrument set-up or the seed.
+        ``picture`` after each exposure that came to the screen at rest, ``shown`` after each
+        one, previews included, ``observation`` after a change of the instrument set-up or the
+        seed.
     """
 
     def __init__(self, viewer: Viewer) -> None:
         self.viewer = viewer
-        self.events = EmitterGroup(source=self, picture=Event, observation=Event)
+        self.events = EmitterGroup(source=self, picture=Event, shown=Event, observation=Event)
         self.editor = SourceEditor(self._soon)
         self.counts = CountsLayer()
         self._observation = Observation()
@@ -359,6 +360,7 @@ class Scene:
         shape = picture.exposure.counts.shape
         if self._alone and (previous is None or previous.exposure.counts.shape != shape):
             self.viewer.reset_view(layers=[self.counts.layer])
+        self.events.shown()
         if picture.final:
             self.events.picture()
         elif self._shown[0] == self._version:
