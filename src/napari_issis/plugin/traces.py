@@ -111,6 +111,7 @@ class Traces:
             self._frozen = bool(frozen)
             self.events.frozen()
             self.events.changed()
+            self._look()
 
     @property
     def scale(self) -> str:

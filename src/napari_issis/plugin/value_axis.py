@@ -49,7 +49,8 @@ class ValueAxis:
         if scale == "log":
             positive = shown[1][shown[1] > 0]
             faintest = float(positive.min()) if positive.size else 1.0
-            lowest = floor(log10(min(faintest, 1.0)))
+            # A single count stands out from none.
+            lowest = floor(log10(min(faintest, 0.5)))
             self.low = 10.0 ** max(lowest, ceil(log10(self.high)) - DECADES)
         elif scale == "snr":
             lowest_snr = min(float(part.min(initial=0.0)) for part in shown)
@@ -65,7 +66,8 @@ class ValueAxis:
         """Return where counts lie on the axis: 0 at its lower end, 1 at its upper one."""
         values = np.maximum(self._values(np.asarray(counts, dtype=np.float64)), self.low)
         fractions = (self._stretch(values) - self._low) / (self._high - self._low)
-        return np.clip(fractions, 0.0, 1.0)
+        inside: Array = np.clip(fractions, 0.0, 1.0)
+        return inside
 
     def ticks(self, most: int) -> list[tuple[float, str]]:
         """Return at most some ``most`` ticks: fraction of the axis, and text."""
