@@ -13,6 +13,7 @@ from qtpy.QtWidgets import QFileDialog, QFrame, QHBoxLayout, QScrollArea, QVBoxL
 from .instrument_form import InstrumentForm
 from .scene import open_scene
 from .source_form import SourceForm
+from .view_form import ViewForm
 from .writer import fits_path
 
 DOCK_NAME = "ISSIS simulator"
@@ -32,6 +33,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.scene = open_scene(viewer=napari_viewer, dock=False)
         self.instrument = InstrumentForm(self.scene)
         self.sources = SourceForm(self.scene)
+        self.view = ViewForm(self.scene)
         self.save = PushButton(
             text="Sav&e FITS…", tooltip="Save counts, expected counts and sources as a FITS file"
         )
@@ -43,6 +45,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         column.setContentsMargins(4, 2, 4, 2)
         column.setSpacing(4)
         column.addWidget(self.instrument)
+        column.addWidget(self.view)
         column.addWidget(self.sources)
         column.addStretch(1)
         scroll = QScrollArea()
@@ -88,6 +91,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self._following = True
             self.instrument.resume()
             self.sources.resume()
+            self.view.resume()
         super().showEvent(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -96,6 +100,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self._following = False
             self.instrument.pause()
             self.sources.pause()
+            self.view.pause()
         super().hideEvent(event)
 
 

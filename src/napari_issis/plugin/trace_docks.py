@@ -219,15 +219,9 @@ class ColumnTrace(TraceWidget):
     def _dock_beside_canvas(self, window: QMainWindow, dock: QDockWidget) -> None:
         if window.dockWidgetArea(dock) != RIGHT:
             return
-        others = [
-            other
-            for other in window.findChildren(QDockWidget)
-            if other is not dock
-            and window.dockWidgetArea(other) == RIGHT
-            and other.isVisible()
-            and not other.isFloating()
-        ]
+        others = [other for other in docks_at_right(window) if other is not dock]
         others.sort(key=lambda other: other.y())
+        widths = [other.width() for other in others[:1]]
         tabs = {other: window.tabifiedDockWidgets(other) for other in others}
         for number, other in enumerate(others):
             above = others[number - 1]
@@ -237,8 +231,7 @@ class ColumnTrace(TraceWidget):
                 window.tabifyDockWidget(above, other)
             else:
                 window.splitDockWidget(above, other, Qt.Orientation.Vertical)
-        widths = [COLUMN_WIDTH, *(max(other.minimumWidth(), 330) for other in others[:1])]
-        window.resizeDocks([dock, *others[:1]], widths, Qt.Orientation.Horizontal)
+        window.resizeDocks([dock, *others[:1]], [COLUMN_WIDTH, *widths], Qt.Orientation.Horizontal)
 
 
 ROW_DOCK, COLUMN_DOCK = "ISSIS row trace", "ISSIS column trace"
@@ -251,6 +244,15 @@ def find_dock(widget: QWidget) -> QDockWidget | None:
     while parent is not None and not isinstance(parent, QDockWidget):
         parent = parent.parentWidget()
     return parent
+
+
+def docks_at_right(window: QMainWindow) -> list[QDockWidget]:
+    """Return the docks in sight at the right of a window."""
+    return [
+        dock
+        for dock in window.findChildren(QDockWidget)
+        if window.dockWidgetArea(dock) == RIGHT and dock.isVisible() and not dock.isFloating()
+    ]
 
 
 def trace_widgets(viewer: Any) -> list[TraceWidget]:
@@ -276,15 +278,23 @@ def show_traces(viewer: Any, visible: bool = True) -> None:
         Whether they are shown.
     """
     widgets = trace_widgets(viewer)
-    if not visible:
-        for widget in widgets:
-            cast(QDockWidget, find_dock(widget)).hide()
+    if visible:
+        there = {type(widget): widget for widget in widgets}
+        for name, kind in _WIDGETS.items():
+            widget = there.get(kind) or _dock(viewer, name, kind)
+            cast(QDockWidget, find_dock(widget)).show()
+            widget.place()
         return
-    there = {type(widget): widget for widget in widgets}
-    for name, kind in _WIDGETS.items():
-        widget = there.get(kind) or _dock(viewer, name, kind)
-        cast(QDockWidget, find_dock(widget)).show()
-        widget.place()
+    docks = [cast(QDockWidget, find_dock(widget)) for widget in widgets]
+    windows = {find_window(widget) for widget in widgets}
+    others = [dock for w in windows if w for dock in docks_at_right(w) if dock not in docks]
+    widths = [other.width() for other in others]
+    for dock in docks:
+        dock.hide()
+    # The room goes back to the canvas, not to the panels beside the column.
+    for window in windows:
+        if window is not None and others:
+            window.resizeDocks(others, widths, Qt.Orientation.Horizontal)
 
 
 def _dock(viewer: Any, name: str, kind: type[TraceWidget]) -> TraceWidget:
