@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from magicgui.widgets import CheckBox, ComboBox, PushButton
-from qtpy.QtWidgets import QSizePolicy
 
 from .canvas_geometry import find_canvas
 from .compass import Compass
@@ -15,6 +14,9 @@ from .side_by_side import SideBySide
 from .trace_docks import FREEZE_KEY, show_traces, traces_shown
 from .traces import traces_of
 from .zoom import FACTORS, FIT_KEY, KEYS, Zoom
+
+# Width of napari's check boxes without their text, pixels on the screen.
+CHECK_BOX = 34
 
 
 class ViewForm(Form):
@@ -64,7 +66,8 @@ class ViewForm(Form):
         self.add("about", self.centre)
         self.add("Show", self.scale_bar, self.compass, self.trace)
         for box in (self.scale_bar, self.compass, self.trace):
-            box.native.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
+            text = box.native.fontMetrics().horizontalAdvance(box.text)
+            box.native.setMinimumWidth(text + CHECK_BOX)
 
         self.layout_.changed.connect(self._lay_out)
         self.fit.changed.connect(self._fit)
