@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from astropy.coordinates import SkyCoord
 from astropy.wcs import WCS
-from napari.components import ViewerModel
+from napari._app_model import get_app_model
 from napari.layers import Image, Points
+from napari.utils.shortcuts import default_shortcuts
 from qtpy.QtCore import QPoint, Qt
-from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 from small_scene import SMALL, few_sources
 
-from napari_issis.fits_header import observation_header
+from napari_issis import source
+from napari_issis.fits_header import wcs_header
 from napari_issis.plugin.canvas_geometry import find_canvas, screen_axis, to_view_box, view_box
 from napari_issis.plugin.compass import Compass
 from napari_issis.plugin.scene import open_scene
@@ -89,7 +90,7 @@ def test_four_times_512_shows_128_pixels(window):
         settle()
         corners = scene.counts.layer.corner_pixels
         short = int(np.argmin(scene.viewer.canvas.size))
-        assert corners[1, short] - corners[0, short] + 1 == pytest.approx(pixels, abs=1)
+        assert corners[1, short] - corners[0, short] + 1 == pytest.approx(pixels, abs=2)
     window.fit.native.click()
     settle()
     axes = [screen_axis(scene.viewer, scene.counts.layer, axis) for axis in (0, 1)]
@@ -128,7 +129,7 @@ def test_keys_act_on_our_layers(window):
         QTest.keyClick(canvas, Qt.Key.Key_4, control)
         box, step = view_box(viewer, layer), screen_axis(viewer, scene.counts.layer, 0).step
         assert abs(step) == pytest.approx(min(box.height / 16, box.width / 20))
-        QTest.keyClick(canvas, Qt.Key.Key_0, control)
+        QTest.keyClick(canvas, Qt.Key.Key_R, shift)
         assert viewer.scene.camera.zoom < abs(step) / 0.036 / 4
         frozen = window.traces.frozen
         QTest.keyClick(canvas, Qt.Key.Key_F, shift)
@@ -145,17 +146,11 @@ def test_the_keys_are_free(window):
     """Catches keys that napari has for its layers, its viewer or its menus."""
     viewer = window.scene.viewer
     keys = [FIT_KEY, FREEZE_KEY, *KEYS.values()]
-    taken = {str(key) for key in type(viewer).keymap} | {
-        str(key) for key in ViewerModel.class_keymap
-    }
+    taken = {str(key) for key in (*viewer.class_keymap, *viewer.keymap)}
     for layer in window.scene.layers:
         taken |= {str(key) for key in type(layer).class_keymap}
-    menus = viewer.window._qt_window.findChildren(QAction)
-    shortcuts = {
-        shortcut.toString(QKeySequence.SequenceFormat.PortableText)
-        for action in menus
-        for shortcut in action.shortcuts()
-    }
+    shortcuts = {str(rule.keybinding) for rule in get_app_model().keybindings}
+    shortcuts |= {str(key) for keys in default_shortcuts.values() for key in keys}
     assert len(taken) > 20
     assert len(shortcuts) > 5
     for key in keys:
@@ -171,6 +166,12 @@ def cells(scene) -> dict[str, tuple[int, int]]:
     return {layer.name: grid.position(i, layers) for i, layer in enumerate(layers)}
 
 
+def corners(layer) -> tuple[float, ...]:
+    """World coordinates of two corners of an image, pixels' edges included."""
+    ny, nx = layer.data.shape
+    return (*layer.data_to_world((-0.5, -0.5)), *layer.data_to_world((ny - 0.5, nx - 0.5)))
+
+
 def test_sources_left_image_right(scene, form):
     """Catches a source model on the image's side, and an active layer that changes."""
     viewer = scene.viewer
@@ -184,10 +185,10 @@ def test_sources_left_image_right(scene, form):
     }
     assert viewer.layers.selection.active is active
     frame = viewer.layers[FRAME_NAME]
-    np.testing.assert_allclose(frame.extent.world, scene.counts.layer.extent.world)
+    assert corners(frame) == pytest.approx(corners(scene.counts.layer))
     scene.observation = SMALL.replace(shape=(32, 48))
     scene.wait()
-    np.testing.assert_allclose(frame.extent.world, scene.counts.layer.extent.world)
+    assert corners(frame) == pytest.approx(corners(scene.counts.layer))
     form.layout_.value = False
     assert FRAME_NAME not in viewer.layers
     assert not viewer.canvas.grid.enabled
@@ -256,58 +257,60 @@ def test_the_end_of_side_by_side(scene, form):
 
 
 @pytest.mark.needs_gl
-@pytest.mark.parametrize("cell", ["model", "image"])
-@pytest.mark.parametrize("active", ["points", "frame"])
-def test_sources_are_dragged_in_either_cell(window, cell, active):
+def test_sources_are_dragged_in_either_cell(window):
     """Catches drags that go astray in the grid, and a dead mouse with the empty frame active."""
     scene, viewer = window.scene, window.scene.viewer
     window.layout_.value = True
     settle(100)
-    frame = viewer.layers[FRAME_NAME]
-    if active == "frame":
-        viewer.layers.selection.active = frame
+    frame, image = viewer.layers[FRAME_NAME], scene.counts.layer
     canvas = find_canvas(window)
-    layer = frame if cell == "model" else scene.counts.layer
-    image = scene.counts.layer
-    shift = np.array([view_box(viewer, layer).left - view_box(viewer, image).left, 0.0])
-    start = to_view_box(viewer, image, (12.5, 20.25)) + shift
-    stop = to_view_box(viewer, image, (22.5, 28.25)) + shift
-    points = [QPoint(*(round(v) for v in start + (stop - start) * f)) for f in (0, 0.3, 0.7, 1)]
-    QTest.mouseMove(canvas, points[0])
-    QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=points[0])
-    for point in points[1:]:
-        QTest.mouseMove(canvas, point)
-        QTest.qWait(20)
-    QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=points[-1])
-    scene.wait()
-    moved = scene.sources[0]
-    step = abs(screen_axis(viewer, image, 1).step)
-    assert (moved["x"], moved["y"]) == pytest.approx((28.25, 22.5), abs=1.5 / step)
-    assert scene.exposure.sources[0]["x"] == moved["x"]
+    row, column = 12.5, 20.25
+    for layer, active in ((frame, scene.editor.points.layer), (image, frame), (frame, frame)):
+        viewer.layers.selection.active = active
+        shift = np.array([view_box(viewer, layer).left - view_box(viewer, image).left, 0.0])
+        start = to_view_box(viewer, image, (row, column)) + shift
+        row, column = row + 10, column + 8
+        stop = to_view_box(viewer, image, (row, column)) + shift
+        points = [QPoint(*(round(v) for v in start + (stop - start) * f)) for f in (0, 0.5, 1)]
+        QTest.mouseMove(canvas, points[0])
+        QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=points[0])
+        for point in points[1:]:
+            QTest.mouseMove(canvas, point)
+            QTest.qWait(20)
+        QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=points[-1])
+        scene.wait()
+        moved = scene.sources[0]
+        step = abs(screen_axis(viewer, image, 1).step)
+        assert (moved["x"], moved["y"]) == pytest.approx((column, row), abs=2 / step)
+        assert scene.exposure.sources[0]["x"] == moved["x"]
+        row, column = moved["y"], moved["x"]
 
 
 @pytest.mark.needs_gl
 def test_both_cells_zoom_together(window):
-    """Catches cells with cameras of their own: what is in sight has to be the same in both."""
+    """Catches cells with cameras of their own.
+
+    The left edge of one marker in the left cell and of one star's light in the right one have
+    to be as far from their cells' corners, in the picture of the canvas.
+    """
+    scene, viewer = window.scene, window.scene.viewer
+    scene.sources = source("point", 50, 20, 1e-13)
+    scene.wait()
     window.layout_.value = True
     settle(100)
     window.factors[2].native.click()
     settle()
-    scene, viewer = window.scene, window.scene.viewer
     picture = viewer.screenshot(flash=False)[..., :3].astype(float)
-    box = view_box(viewer, scene.counts.layer)
     scale = picture.shape[1] / viewer.canvas.size[1]
-    x, y = to_view_box(viewer, scene.counts.layer, (30.0, 40.0))
-    right = picture[:, int(box.left * scale) :].max(axis=-1)
-    row, column = np.unravel_index(right[:, 5:-5].argmax(), right[:, 5:-5].shape)
-    assert right.max() > 150
-    assert abs(row / scale - y) < 0.5 * box.height
-    model = viewer.layers[FRAME_NAME]
-    assert view_box(viewer, model).width == pytest.approx(box.width)
-    assert to_view_box(viewer, model, (0.0, 0.0))[1] == pytest.approx(
-        to_view_box(viewer, scene.counts.layer, (31.5, 39.5))[1]
-    )
-    assert x > box.left
+    places = []
+    for name, seen in (
+        (FRAME_NAME, (picture[..., 0] > 150) & (picture[..., 1] < 60)),
+        ("ISSIS counts", picture.min(axis=-1) > 200),
+    ):
+        box = view_box(viewer, viewer.layers[name])
+        cell = seen[:, round(box.left * scale) : round((box.left + box.width) * scale)]
+        places.append(np.argwhere(cell).mean(axis=0))
+    assert places[0] == pytest.approx(places[1], abs=4)
 
 
 # ---------------------------------------------------------------- scale bar and compass
@@ -333,7 +336,7 @@ def test_north_and_east_are_those_of_the_file(scene, qtbot, roll):
     pointing = SkyCoord("10h0m0s +2d0m0s")
     scene.observation = SMALL.replace(pointing=pointing, roll=roll)
     scene.wait()
-    wcs = WCS(observation_header(scene.exposure))
+    wcs = WCS(wcs_header(scene.observation))
     centre = np.array([39.5, 31.5])
     for name, angle in (("N", 0), ("E", 90)):
         there = pointing.directional_offset_by(angle * u.deg, 0.5 * u.arcsec)
@@ -356,7 +359,7 @@ def test_north_is_up_and_east_left_at_roll_zero(scene, qtbot):
 @pytest.mark.needs_gl
 def test_the_compass_lies_over_the_image_and_lets_the_mouse_through(window):
     """Catches a compass in the way of the mouse, or one that stays behind when the window grows."""
-    scene, viewer = window.scene, window.scene.viewer
+    viewer = window.scene.viewer
     window.compass.native.click()
     settle()
     canvas = find_canvas(window)

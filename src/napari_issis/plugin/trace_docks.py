@@ -53,7 +53,7 @@ class TraceWidget(QWidget):  # type: ignore[misc]
         self.frozen = QCheckBox("Freeze")
         self.frozen.setToolTip(
             f"Keep row and column where they are; they follow the picture all the same "
-            f"({FREEZE_KEY} with an ISSIS layer active)"
+            f"({FREEZE_KEY.replace('-', '+')} with an ISSIS layer active)"
         )
         self.save = QPushButton("Save…")
         self.save.setToolTip(f"Save position, counts and expected counts of this {self.along}")

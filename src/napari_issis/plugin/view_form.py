@@ -49,14 +49,14 @@ class ViewForm(Form):
             for factor in FACTORS
         }
         self.centre = ComboBox(
-            choices=["frame", ("selected sources", "selected")],
+            choices=[("frame", "frame"), ("selected sources", "selected")],
             tooltip="About what to zoom; the frame, while no source is selected",
         )
         self.scale_bar = CheckBox(text="Scale bar", tooltip="napari's scale bar, in arcsec")
         self.compass = CheckBox(text="N, E", tooltip="Mark north and east, by the roll")
         self.trace = CheckBox(
             text="Traces",
-            tooltip=f"Plot the row and the column under the pointer ({FREEZE_KEY} freezes them)",
+            tooltip=f"Plot the row and the column under the pointer ({_shown(FREEZE_KEY)} freezes them)",
         )
         self.add("Frames", self.layout_)
         self.add("Zoom", self.fit, *self.factors.values())
@@ -156,4 +156,4 @@ class ViewForm(Form):
 
 
 def _shown(key: str) -> str:
-    return key.replace("Control-", "Ctrl+")
+    return key.replace("Control-", "Ctrl+").replace("-", "+")

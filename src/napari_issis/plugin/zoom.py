@@ -11,8 +11,8 @@ from .canvas_geometry import view_box
 from .scene import Scene
 
 FACTORS = (1, 2, 4, 8)
-# Keys of an active layer of ours; 0 fits the frame with a margin.
-FIT_KEY = "Control-0"
+# Keys of an active layer of ours; napari has Ctrl+0 and Ctrl+R.
+FIT_KEY = "Shift-R"
 KEYS = {factor: f"Control-{factor}" for factor in FACTORS}
 
 
