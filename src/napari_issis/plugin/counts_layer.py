@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from napari.layers import Image
 from napari.utils.colormaps import Colormap, ensure_colormap
+from napari.utils.events import EmitterGroup, Event
 from numpy.typing import NDArray
 
 from ..exposure import Exposure
@@ -27,9 +28,12 @@ class CountsLayer:
     ----------
     layer : napari.layers.Image or None
         None where the user deleted it.
+    events : napari.utils.events.EmitterGroup
+        ``scale`` after a change of the brightness scale.
     """
 
     def __init__(self) -> None:
+        self.events = EmitterGroup(source=self, scale=Event)
         self._layer: Image | None = None
         self._picture: Picture | None = None
         self._limits: tuple[float, ...] | None = None
@@ -65,6 +69,7 @@ class CountsLayer:
         if scale != self._scale:
             self._scale = scale
             self.set_limits(None)
+            self.events.scale()
 
     @property
     def shows(self) -> str:

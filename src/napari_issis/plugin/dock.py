@@ -15,15 +15,18 @@ from qtpy.QtWidgets import (
     QHBoxLayout,
     QPushButton,
     QScrollArea,
+    QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
+from .display_form import DisplayForm
 from .instrument_form import InstrumentForm
 from .panels import LIST_NAME, toggle_panel
 from .scene import open_scene
 from .source_form import SourceForm
 from .source_list import SourceList
+from .view_form import ViewForm
 from .writer import fits_path
 
 DOCK_NAME = "ISSIS simulator"
@@ -43,6 +46,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.scene = open_scene(viewer=napari_viewer, dock=False)
         self.instrument = InstrumentForm(self.scene)
         self.sources = SourceForm(self.scene)
+        self.display = DisplayForm(self.scene)
+        self.view = ViewForm(self.scene)
         self.save = PushButton(
             text="Sav&e FITS…", tooltip="Save counts, expected counts and sources as a FITS file"
         )
@@ -64,21 +69,14 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             shortcut.activated.connect(action)
         self._following = False
 
-        page = QWidget()
-        column = QVBoxLayout(page)
-        column.setContentsMargins(4, 2, 4, 2)
-        column.setSpacing(4)
-        column.addWidget(self.instrument)
-        column.addWidget(self.sources)
-        column.addStretch(1)
-        scroll = QScrollArea()
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(page)
+        self.pages = QTabWidget()
+        self.pages.addTab(_page(self.instrument, self.sources), "Scene")
+        self.pages.addTab(_page(self.display, self.view), "View")
+        self.pages.setTabToolTip(0, "Instrument, and sources to add")
+        self.pages.setTabToolTip(1, "Brightness, frames, zoom, traces")
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 4)
-        layout.addWidget(scroll)
+        layout.addWidget(self.pages)
         buttons = QHBoxLayout()
         buttons.setContentsMargins(4, 0, 4, 0)
         buttons.addWidget(self.sources.button.native)
@@ -131,6 +129,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.sources.resume()
             self.scene.events.picture.connect(self.show_steps)
             self.show_steps()
+            self.display.resume()
+            self.view.resume()
         super().showEvent(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -140,7 +140,25 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.instrument.pause()
             self.sources.pause()
             self.scene.events.picture.disconnect(self.show_steps)
+            self.display.pause()
+            self.view.pause()
         super().hideEvent(event)
+
+
+def _page(*forms: QWidget) -> QScrollArea:
+    page = QWidget()
+    column = QVBoxLayout(page)
+    column.setContentsMargins(4, 2, 4, 2)
+    column.setSpacing(4)
+    for form in forms:
+        column.addWidget(form)
+    column.addStretch(1)
+    scroll = QScrollArea()
+    scroll.setWidgetResizable(True)
+    scroll.setFrameShape(QFrame.Shape.NoFrame)
+    scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    scroll.setWidget(page)
+    return scroll
 
 
 def _tool(label: str, action: Callable[[], None]) -> QPushButton:

@@ -51,8 +51,8 @@ class Scene:
     Attributes
     ----------
     events : napari.utils.events.EmitterGroup
-        ``picture`` after each exposure that came to the screen at rest, ``preview`` after each
-        other one, ``observation`` after a change of the instrument set-up or the seed,
+        ``picture`` after each exposure that came to the screen at rest, ``shown`` after each
+        one, previews included, ``observation`` after a change of the instrument set-up or the seed,
         ``sources`` after a change of the source table, also during a drag, ``selection`` when
         other sources are selected.
     units : Units
@@ -64,7 +64,7 @@ class Scene:
         self.events = EmitterGroup(
             source=self,
             picture=Event,
-            preview=Event,
+            shown=Event,
             observation=Event,
             sources=Event,
             selection=Event,
@@ -424,10 +424,10 @@ class Scene:
         shape = picture.exposure.counts.shape
         if self._alone and (previous is None or previous.exposure.counts.shape != shape):
             self.viewer.reset_view(layers=[self.counts.layer])
+        self.events.shown()
         if picture.final:
             self.events.picture()
             return
-        self.events.preview()
         if self._shown[0] == self._version:
             # The mouse rests: when it does so for long, show what the drag would end with.
             self._pause.start()
