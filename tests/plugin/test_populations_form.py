@@ -8,7 +8,8 @@ import pytest
 from astropy.io import fits
 from astropy.table import QTable
 from napari.utils.notifications import notification_manager
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QPoint, QPointF, Qt
+from qtpy.QtGui import QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QLabel
 from small_scene import SMALL, few_sources
@@ -120,12 +121,34 @@ def test_any_number_can_be_typed_or_chosen(form):
     form.number.number = 250
     assert len(form.table()) == 250
     assert box.styleSheet() == ""
-    for text in ("2.5", "0", "-3", "1e3", "", "many"):
+    for text in ("2.5", "0", "-3", "1e3", "", "many", "1000001"):
         box.setEditText(text)
         with pytest.raises(ValueError, match=f"number of sources is '{text}'"):
             form.table()
         assert "#b00020" in box.styleSheet()
         assert text in box.toolTip()
+
+
+def test_the_wheel_does_not_change_the_number(form):
+    """Catches 100 sources that become 10 while the panel is scrolled."""
+    box = form.number.native
+    box.setCurrentIndex(1)
+    form.mode.value = "random"
+    form.show()
+    for widget in (box, box.lineEdit()):
+        point = QPointF(widget.rect().center())
+        event = QWheelEvent(
+            point,
+            widget.mapToGlobal(point),
+            QPoint(0, 0),
+            QPoint(0, -120),
+            Qt.MouseButton.NoButton,
+            Qt.KeyboardModifier.NoModifier,
+            Qt.ScrollPhase.NoScrollPhase,
+            False,
+        )
+        QApplication.sendEvent(widget, event)
+        assert form.number.number == 10
 
 
 def shown(form):

@@ -176,6 +176,7 @@ def test_a_hidden_dock_follows_nothing(calm, qtbot, monkeypatch):
         (InstrumentForm, "show_observation"),
         (InstrumentForm, "show_warnings"),
         (SourceForm, "show_centre"),
+        (SourceForm, "show_units"),
     ):
         real = getattr(form, name)
 
@@ -190,10 +191,11 @@ def test_a_hidden_dock_follows_nothing(calm, qtbot, monkeypatch):
     dock.hide()
     shown.clear()
     calm.observation = calm.observation.replace(exposure=20.0, shape=(50, 60))
+    calm.units.flux = "AB mag"
     calm.wait()
     assert shown == []
     dock.show()
-    assert set(shown) == {"show_observation", "show_warnings", "show_centre"}
+    assert set(shown) == {"show_observation", "show_warnings", "show_centre", "show_units"}
     shown.clear()
     calm.new_noise()
     calm.wait()

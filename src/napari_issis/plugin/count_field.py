@@ -6,9 +6,12 @@ from qtpy.QtWidgets import QComboBox
 
 INVALID_STYLE = "QComboBox, QComboBox QLineEdit { color: #b00020; background: #ffe3e3; }"
 
+# More are a slip of the pen, and would stop the program for minutes.
+MOST = 1_000_000
+
 
 class CountField:
-    """A field for a whole number, 1 or more; red, with the reason as tooltip, while it is none.
+    """A field for a whole number, 1 to a million; red, with the reason as tooltip, if it is none.
 
     Parameters
     ----------
@@ -37,9 +40,11 @@ class CountField:
     def number(self) -> int:
         """The number; a ``ValueError`` that names the field if there is no valid one."""
         text = self.native.currentText().strip()
-        if text.isascii() and text.isdecimal() and int(text) > 0:
+        if text.isascii() and text.isdecimal() and 1 <= int(text) <= MOST:
             return int(text)
-        raise ValueError(f"{self._name} is {text!r}; it must be a whole number such as 250.")
+        raise ValueError(
+            f"{self._name} is {text!r}; it must be a whole number such as 250, at most {MOST}."
+        )
 
     @number.setter
     def number(self, number: int) -> None:

@@ -131,7 +131,8 @@ class FluxRows:
         metrics = button.fontMetrics()
         room = button.width() - metrics.horizontalAdvance(count) - BUTTON_MARGIN
         name = metrics.elidedText(Path(path).name, Qt.TextElideMode.ElideMiddle, max(room, 60))
-        self.file.text = name + count
+        # An ampersand would mark a key.
+        self.file.text = name.replace("&", "&&") + count
         self.file.tooltip = f"{len(sample)} fluxes of {path}; press to choose another table"
 
     def ask_path(self) -> str | None:

@@ -174,21 +174,20 @@ class SourceForm(Form):
 
     def resume(self) -> None:
         """Follow the scene's frame, channel and units."""
-        self.scene.events.observation.connect(self.show_observation)
+        # Magnitudes are at the channel's wavelength.
+        self.scene.events.observation.connect(self.show_centre)
+        self.scene.events.observation.connect(self.show_units)
         self.scene.units.events.changed.connect(self.show_units)
-        self.show_observation()
-
-    def pause(self) -> None:
-        """Stop following the scene."""
-        self.scene.events.observation.disconnect(self.show_observation)
-        self.scene.units.events.changed.disconnect(self.show_units)
-
-    def show_observation(self, event: Any = None) -> None:
-        """Follow the frame, and the channel at whose wavelength magnitudes are."""
         self.show_centre()
         self.show_units()
 
-    def show_centre(self) -> None:
+    def pause(self) -> None:
+        """Stop following the scene."""
+        self.scene.events.observation.disconnect(self.show_centre)
+        self.scene.events.observation.disconnect(self.show_units)
+        self.scene.units.events.changed.disconnect(self.show_units)
+
+    def show_centre(self, event: Any = None) -> None:
         """Offer the centre of the frame as the place of the next source, unless one was typed."""
         ny, nx = self.scene.observation.shape
         if (self.x.value, self.y.value) == self._centre:
