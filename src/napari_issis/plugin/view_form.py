@@ -56,7 +56,7 @@ class ViewForm(Form):
         self.compass = CheckBox(text="N, E", tooltip="Mark north and east, by the roll")
         self.trace = CheckBox(
             text="Traces",
-            tooltip=f"Plot the row and the column under the pointer ({_shown(FREEZE_KEY)} freezes them)",
+            tooltip=f"Plot row and column under the pointer ({_shown(FREEZE_KEY)} freezes them)",
         )
         self.add("Frames", self.layout_)
         self.add("Zoom", self.fit, *self.factors.values())
