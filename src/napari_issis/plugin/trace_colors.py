@@ -24,13 +24,10 @@ def trace_colors(theme_name: str) -> TraceColors:
     """Return the colours that suit a theme."""
     theme = get_theme(theme_name)
     dark = theme.type == "dark"
-    text = QColor(*theme.text.as_rgb_tuple(alpha=False))
-    grid = QColor(text)
-    grid.setAlpha(40)
     return TraceColors(
         background=QColor("#101418" if dark else "#fbfbfb"),
-        grid=grid,
-        text=text,
+        grid=QColor("#33383d" if dark else "#d5d7d9"),
+        text=QColor(*theme.text.as_rgb_tuple(alpha=False)),
         counts=QColor("#7cc7ff" if dark else "#1565a8"),
         expected=QColor("#ffb454" if dark else "#c2410c"),
         marker=QColor("#ff6b6b" if dark else "#b91c1c"),

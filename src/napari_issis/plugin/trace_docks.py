@@ -22,7 +22,6 @@ from qtpy.QtWidgets import (
 
 from .canvas_geometry import find_window
 from .scene import open_scene
-from .trace_colors import trace_colors
 from .trace_plot import TracePlot
 from .traces import Along, Trace, traces_of
 
@@ -67,7 +66,7 @@ class TraceWidget(QWidget):  # type: ignore[misc]
 
     def _text(self, trace: Trace) -> list[str]:
         """Title of the plot, in parts."""
-        colors = trace_colors(self.traces.scene.viewer.theme)
+        colors = self.plot.colors
         count, expected = trace.counts[trace.position], trace.expected[trace.position]
         place, across = ("Row y", "x") if self.along == "row" else ("Column x", "y")
         return [
@@ -123,6 +122,7 @@ class TraceWidget(QWidget):  # type: ignore[misc]
         if not self._following:
             self._following = True
             self.traces.events.changed.connect(self.show_title)
+            self.traces.scene.viewer.events.theme.connect(self.show_title)
             self.traces.events.frozen.connect(self.show_frozen)
             self.show_title()
             self.show_frozen()
@@ -136,6 +136,7 @@ class TraceWidget(QWidget):  # type: ignore[misc]
         if self._following:
             self._following = False
             self.traces.events.changed.disconnect(self.show_title)
+            self.traces.scene.viewer.events.theme.disconnect(self.show_title)
             self.traces.events.frozen.disconnect(self.show_frozen)
         super().hideEvent(event)
 

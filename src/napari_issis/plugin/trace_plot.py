@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import floor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from qtpy.QtCore import QEvent, QObject, QPoint, QPointF, QRectF, Qt
-from qtpy.QtGui import QHideEvent, QPainter, QPaintEvent, QPen, QPolygonF, QShowEvent
+from qtpy.QtGui import QColor, QHideEvent, QPainter, QPaintEvent, QPen, QPolygonF, QShowEvent
 from qtpy.QtWidgets import QSizePolicy, QWidget
 
 from .canvas_geometry import ScreenAxis, find_canvas, screen_axis
@@ -65,6 +66,7 @@ class TracePlot(QWidget):  # type: ignore[misc]
         self.traces, self.along = traces, along
         self._canvas: QWidget | None = None
         self._watching = False
+        self._theme = ""
         self._colors: TraceColors | None = None
         self.setMinimumSize(60, 50)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -82,8 +84,6 @@ class TracePlot(QWidget):  # type: ignore[misc]
         self._watching = True
         for emitter in self._emitters:
             emitter.connect(self._redraw)
-        self.traces.scene.viewer.events.theme.connect(self._forget_colors)
-        self._forget_colors()
         self.traces.watch()
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -94,7 +94,6 @@ class TracePlot(QWidget):  # type: ignore[misc]
         self._watching = False
         for emitter in self._emitters:
             emitter.disconnect(self._redraw)
-        self.traces.scene.viewer.events.theme.disconnect(self._forget_colors)
         self._follow_canvas(None)
         self.traces.unwatch()
 
@@ -108,14 +107,11 @@ class TracePlot(QWidget):  # type: ignore[misc]
             camera.zoom,
             camera.orientation,
             viewer.canvas.events.size,
+            viewer.events.theme,
             *(grid.enabled, grid.stride, grid.shape, grid.spacing),
         ]
 
     def _redraw(self, event: Any = None) -> None:
-        self.update()
-
-    def _forget_colors(self, event: Any = None) -> None:
-        self._colors = None
         self.update()
 
     def _follow_canvas(self, canvas: QWidget | None) -> None:
@@ -133,6 +129,14 @@ class TracePlot(QWidget):  # type: ignore[misc]
         return False
 
     # ---------------------------------------------------------------- geometry
+
+    @property
+    def colors(self) -> TraceColors:
+        """Colours that suit the viewer's theme."""
+        theme = self.traces.scene.viewer.theme
+        if self._colors is None or theme != self._theme:
+            self._theme, self._colors = theme, trace_colors(theme)
+        return self._colors
 
     def area(self) -> PlotArea | None:
         """Return where the plot is drawn now; None if the canvas shows no such axis."""
@@ -160,8 +164,7 @@ class TracePlot(QWidget):  # type: ignore[misc]
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the plot."""
-        if self._colors is None:
-            self._colors = trace_colors(self.traces.scene.viewer.theme)
+        colors = self.colors
         painter = QPainter(self)
         trace, area = self.traces.trace(self.along), self.area()
         if trace is None or area is None or area.axis.stop - area.axis.start < 2:
@@ -169,18 +172,20 @@ class TracePlot(QWidget):  # type: ignore[misc]
         first, stop = area.axis.visible(trace.counts.size)
         counts, expected = trace.counts[first:stop], trace.expected[first:stop]
         values = ValueAxis(self.traces.scale, counts, expected, trace.background)
-        painter.fillRect(self._inside(area), self._colors.background)
+        painter.fillRect(self._inside(area), colors.background)
         self._draw_value_axis(painter, area, values)
         self._draw_pixel_axis(painter, area, first, stop)
         painter.setClipRect(self._inside(area).adjusted(-1, -1, 1, 1))
         if first < stop:
             edges = area.axis.to_canvas(np.arange(first, stop + 1) - 0.5)
             places, heights = steps(edges, area.values(values.fractions(counts)))
-            self._draw_curve(painter, self._colors.counts, places, heights)
+            self._draw_curve(painter, colors.counts, places, heights)
             centres = area.axis.to_canvas(np.arange(first, stop))
             line = area.values(values.fractions(expected))
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            self._draw_curve(painter, self._colors.expected, centres, line, 1.4)
+            # A line of hundreds of peaks is no smoother for it, and slow.
+            smooth = abs(area.axis.step) >= 0.5
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing, smooth)
+            self._draw_curve(painter, colors.expected, centres, line, 1.4 if smooth else 1.0)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         self._draw_marker(painter, area, trace)
 
@@ -202,7 +207,6 @@ class TracePlot(QWidget):  # type: ignore[misc]
         painter.drawPolyline(QPolygonF(list(map(QPointF, x.tolist(), y.tolist()))))
 
     def _draw_value_axis(self, painter: QPainter, area: PlotArea, values: ValueAxis) -> None:
-        assert self._colors is not None
         row = self.along == "row"
         start, stop = area.axis.start, area.axis.stop
         most = max(int(area.room / (TICK_DOWN if row else TICK_ACROSS)), 1)
@@ -210,9 +214,8 @@ class TracePlot(QWidget):  # type: ignore[misc]
         beside = start >= LEFT
         for fraction, text in values.ticks(most):
             place = float(area.values(np.array(fraction)))
-            painter.setPen(self._colors.grid)
-            painter.drawLine(self._point(start, place), self._point(stop, place))
-            painter.setPen(self._colors.text)
+            self._draw_rule(painter, (start, place), (stop, place), self.colors.grid)
+            painter.setPen(self.colors.text)
             if row and beside:
                 box = QRectF(start - LEFT, place - 8, LEFT - 5, 16)
                 painter.drawText(box, ALIGN.AlignRight | ALIGN.AlignVCenter, text)
@@ -234,7 +237,6 @@ class TracePlot(QWidget):  # type: ignore[misc]
             painter.drawText(box, ALIGN.AlignHCenter | ALIGN.AlignTop, values.unit)
 
     def _draw_pixel_axis(self, painter: QPainter, area: PlotArea, first: int, stop: int) -> None:
-        assert self._colors is not None
         row, axis = self.along == "row", area.axis
         distance = TICK_ACROSS if row else TICK_DOWN
         most = max(int((stop - first) * abs(axis.step) / distance), 1)
@@ -244,9 +246,8 @@ class TracePlot(QWidget):  # type: ignore[misc]
             place = float(axis.to_canvas(pixel))
             if not axis.start <= place <= axis.stop:
                 continue
-            painter.setPen(self._colors.grid)
-            painter.drawLine(self._point(place, area.bottom), self._point(place, area.top))
-            painter.setPen(self._colors.text)
+            self._draw_rule(painter, (place, area.bottom), (place, area.top), self.colors.grid)
+            painter.setPen(self.colors.text)
             if row:
                 box = QRectF(place - 24, area.bottom + 2, 48, 15)
                 painter.drawText(box, ALIGN.AlignHCenter | ALIGN.AlignTop, tick_text(pixel))
@@ -262,13 +263,25 @@ class TracePlot(QWidget):  # type: ignore[misc]
             painter.drawText(box, ALIGN.AlignRight | ALIGN.AlignTop, unit)
 
     def _draw_marker(self, painter: QPainter, area: PlotArea, trace: Trace) -> None:
-        assert self._colors is not None
         place = float(area.axis.to_canvas(trace.position))
-        pen = QPen(self._colors.marker, 1.0)
-        if self.traces.frozen:
-            pen.setStyle(Qt.PenStyle.DashLine)
-        painter.setPen(pen)
+        if not self.traces.frozen:
+            ends = (place, area.bottom), (place, area.top)
+            self._draw_rule(painter, *ends, self.colors.marker)
+            return
+        painter.setPen(QPen(self.colors.marker, 1.0, Qt.PenStyle.DashLine))
         painter.drawLine(self._point(place, area.bottom), self._point(place, area.top))
+
+    def _draw_rule(
+        self,
+        painter: QPainter,
+        first: tuple[float, float],
+        second: tuple[float, float],
+        color: QColor,
+    ) -> None:
+        """Draw a straight line one pixel thick, as a rectangle: ten times as fast as a line."""
+        ends = QRectF(self._point(*first), self._point(*second)).normalized()
+        left, top = floor(ends.left()), floor(ends.top())
+        painter.fillRect(left, top, max(int(ends.width()), 1), max(int(ends.height()), 1), color)
 
 
 def steps(edges: Array, heights: Array) -> tuple[Array, Array]:
@@ -280,16 +293,13 @@ def steps(edges: Array, heights: Array) -> tuple[Array, Array]:
 def thinned(places: Array, heights: Array) -> tuple[Array, Array]:
     """Thin out a curve with many points to a pixel of the screen; peaks keep their heights.
 
-    Of the points on the same pixel stay the first, the lowest, the highest and the last.
+    Of the points on the same pixel stay the lowest and the highest.
     """
     length = abs(float(places[-1] - places[0])) if places.size else 0.0
-    if places.size <= 6 * (length + 1):
+    if places.size <= 3 * (length + 1):
         return places, heights
     column = np.floor(places).astype(np.int64)
     firsts = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1])
-    lasts = np.concatenate([firsts[1:], [places.size]]) - 1
     low = np.minimum.reduceat(heights, firsts)
     high = np.maximum.reduceat(heights, firsts)
-    centre = np.repeat(places[firsts], 4)
-    four = np.column_stack([heights[firsts], low, high, heights[lasts]])
-    return centre, four.ravel()
+    return np.repeat(places[firsts], 2), np.column_stack([low, high]).ravel()
