@@ -36,7 +36,7 @@ def main() -> None:
         widgets = trace_widgets(viewer)
         traces = widgets[0].traces
         for scale in SCALES:
-            traces.scale = scale
+            scene.counts.scale = scale
             settle()
             times = []
             for number in range(REPEATS):
