@@ -14,8 +14,8 @@ import numpy as np
 from qtpy.QtWidgets import QApplication
 
 import napari_issis as ni
+from napari_issis.plugin.brightness import SCALES
 from napari_issis.plugin.trace_docks import show_traces, trace_widgets
-from napari_issis.plugin.traces import SCALES
 
 REPEATS = 40
 
