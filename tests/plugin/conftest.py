@@ -120,7 +120,8 @@ class Mouse:
             each.scale_factor = 0.036 / 4
         run(self.viewer, event)
         layer = self.viewer.layers.selection.active
-        run(layer, event)
+        if layer is not None:
+            run(layer, event)
 
 
 @pytest.fixture

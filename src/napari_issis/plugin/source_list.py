@@ -41,7 +41,7 @@ from .source_model import SourceModel
 # Milliseconds between two updates during a drag.
 REST = 100
 # Characters that the columns are wide enough for.
-WIDTHS = {"kind": 16, "flux": 18, "counts": 11}
+WIDTHS = {"kind": 20, "flux": 18, "counts": 11}
 TABLES = f"Source tables ({' '.join('*' + suffix for suffix in SUFFIXES)})"
 
 
