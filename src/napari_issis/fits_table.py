@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
+from io import BytesIO
+from typing import Any, BinaryIO
 
 import astropy.units as u
 import numpy as np
 from astropy.io import fits
 from astropy.table import MaskedColumn, QTable, Table
 
+from .fits_claims import check_claims
+from .reading import one_line, open_file
+
+
+# A packed file is unpacked in memory, up to so many bytes.
+MOST_UNPACKED = 256 * 2**20
+GZIP = b"\x1f\x8b"
+VARIABLE = re.compile(r"\d*[PQ]")
+
 
 @contextmanager
 def open_fits(path: str | os.PathLike[str]) -> Iterator[fits.HDUList]:
-    """Open a FITS file after checking that it is whole.
+    """Open a FITS file, gzip-packed or not, after checking that it is whole.
 
     Parameters
     ----------
@@ -34,47 +45,50 @@ def open_fits(path: str | os.PathLike[str]) -> Iterator[fits.HDUList]:
         If the file cannot be opened.
     ValueError
         If it is empty, no FITS file, truncated or damaged (its ``DATASUM`` cards disagree),
-        or if the body of the ``with`` statement finds fault with it; the message names it.
+        claims more than it can hold (see `napari_issis.fits_claims`), or if the body of the
+        ``with`` statement finds fault with it; the message names it.
     """
-    try:
-        with Path(path).open("rb") as file:
+    with open_file(path) as opened:
+        file = opened
+        start = file.read(9)
+        if start.startswith(GZIP):
+            file = _unpacked(file, path)
             start = file.read(9)
-            size = os.fstat(file.fileno()).st_size
-    except OSError as error:
-        raise type(error)(f"cannot read {path}: {error.strerror or error}.") from error
-    if not start:
-        raise ValueError(f"{path} is empty.")
-    if start != b"SIMPLE  =":
-        raise ValueError(f"{path} is not a FITS file: it does not start with SIMPLE.")
+        if start != b"SIMPLE  =":
+            raise ValueError(f"{path} is not a FITS file: it does not start with SIMPLE.")
+        size = file.seek(0, os.SEEK_END)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                check_claims(file, size)
+                file.seek(0)
+                # Not closed: that would be to close the file, which has its own with.
+                yield fits.open(file, memmap=False)
+        except MemoryError:
+            raise
+        except ValueError as error:
+            raise ValueError(f"{path}: {one_line(error)}") from error
+        except Exception as error:
+            # What astropy raises on a broken file is not restricted to a few types.
+            raise ValueError(f"{path} is damaged: {one_line(error)}") from error
+
+
+def _unpacked(file: BinaryIO, path: str | os.PathLike[str]) -> BinaryIO:
+    file.seek(0)
+    inflate = zlib.decompressobj(wbits=31)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            _check_whole(path, size)
-            with fits.open(path, memmap=False) as hdus:
-                yield hdus
-    except ValueError as error:
-        raise ValueError(f"{path}: {_one_line(error)}") from error
-    except Exception as error:
-        # What astropy raises on a broken file is not restricted to a few types.
-        raise ValueError(f"{path} is damaged: {_one_line(error)}") from error
-
-
-def _check_whole(path: str | os.PathLike[str], size: int) -> None:
-    with fits.open(path, memmap=False, disable_image_compression=True) as hdus:
-        for hdu in hdus:
-            place = hdu.fileinfo()
-            end = place["datLoc"] + place["datSpan"]
-            if end > size:
-                raise ValueError(f"the file is truncated: {end} bytes are due, it has {size}.")
-            if hdu.verify_datasum() == 0:
-                raise ValueError(
-                    f"the data of {hdu.name or 'an extension'} do not match their DATASUM; "
-                    "the file is damaged or was changed."
-                )
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+        content = inflate.decompress(file.read(), MOST_UNPACKED + 1)
+    except zlib.error as error:
+        raise ValueError(
+            f"{path} is not a FITS file: its gzip data are damaged ({one_line(error)})."
+        ) from error
+    if len(content) > MOST_UNPACKED:
+        raise ValueError(
+            f"{path} holds more than {MOST_UNPACKED} bytes; unpack it first with gunzip."
+        )
+    if not inflate.eof:
+        raise ValueError(f"{path} is truncated: its gzip data have no end.")
+    return BytesIO(content)
 
 
 def table_hdu(table: Table, name: str) -> fits.BinTableHDU:
@@ -150,11 +164,15 @@ def parse_unit(text: str) -> u.UnitBase:
 def read_table(hdu: fits.BinTableHDU) -> QTable:
     """Read a FITS table; columns with units become quantities, in the machine's byte order.
 
+    Columns of arrays whose length varies from row to row are left out.
+
     Parameters
     ----------
     hdu : astropy.io.fits.BinTableHDU
         The extension.
     """
+    for name in [column.name for column in hdu.columns if VARIABLE.match(str(column.format))]:
+        hdu.columns.del_col(name)
     units = {column.name: column.unit for column in hdu.columns}
     plain = Table.read(hdu, mask_invalid=False)
     table = QTable()
