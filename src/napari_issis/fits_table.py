@@ -19,7 +19,6 @@ from astropy.table import MaskedColumn, QTable, Table
 from .fits_claims import check_claims
 from .reading import one_line, open_file
 
-
 # A packed file is unpacked in memory, up to so many bytes.
 MOST_UNPACKED = 256 * 2**20
 GZIP = b"\x1f\x8b"

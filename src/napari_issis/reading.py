@@ -28,7 +28,7 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
         if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
             # A pipe would be waited for, a device never end.
             raise OSError(f"cannot read {path}: it is not a regular file.")
-        file = Path(path).open("rb")
+        file = Path(path).open("rb")  # noqa: SIM115
     except OSError as error:
         if error.errno is None:
             raise
