@@ -1,6 +1,7 @@
 """Region files of DS9; the regions package of astropy is the oracle where it is installed."""
 
 import astropy.units as u
+import numpy as np
 import pytest
 from astropy.coordinates import SkyCoord
 from astropy.wcs import WCS
@@ -80,7 +81,7 @@ def test_an_angle_is_one_in_the_system_of_the_region(tmp_path, system):
         wcs.world_to_pixel(point)
         for point in (centre, centre.directional_offset_by(-90 * u.deg, 1 * u.arcsec))
     )
-    assert (arrays.x[0], arrays.y[0]) == pytest.approx((x, y), abs=0.01)
+    assert (arrays.x[0], arrays.y[0]) == pytest.approx((float(x), float(y)), abs=0.01)
     expected = np.degrees(np.arctan2(-(tip_x - x), tip_y - y))
     assert abs((arrays.pa[0] - expected + 90) % 180 - 90) < 0.05
 
