@@ -29,6 +29,7 @@ FRAMES = {
     "ecliptic": "barycentricmeanecliptic",
 }
 PIXELS = ("image", "physical")
+LONGEST_LABEL = 200
 _SHAPE = re.compile(r"([+-]?)\s*([a-z]+)\s*\(([^()#]*)\)?(.*)", re.IGNORECASE)
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _SEXAGESIMAL = re.compile(r"([+-]?)(\d{1,3})[:hd](\d{1,2})[:m](\d{1,2}(?:\.\d*)?)s?")
@@ -96,9 +97,8 @@ def read_regions(
             values = _values(shape, inside, number, frame)
             (sky.setdefault(frame, []) if frame else pixels).append(values)
             label = _LABEL.search(after)
-            names.setdefault(frame, []).append(
-                next((text for text in label.groups() if text is not None), "") if label else ""
-            )
+            texts = [text for text in label.groups() if text is not None] if label else [""]
+            names.setdefault(frame, []).append(texts[0][:LONGEST_LABEL])
     if not pixels and not sky:
         raise ValueError(f"{path} holds no point, circle or ellipse.")
     notes = []

@@ -6,6 +6,7 @@ thousandfold. Every claim is checked here against the bytes that are there.
 
 from __future__ import annotations
 
+import re
 import zlib
 from math import ceil, prod
 from typing import Any, BinaryIO
@@ -19,6 +20,9 @@ END = b"END".ljust(CARD)
 # about a second.
 MOST_CARDS = 36_000
 MOST_EXTENSIONS = 500
+# As the standard has it; of columns too.
+MOST_AXES = 999
+_COUNT = re.compile(rb"(Z?NAXIS|TFIELDS) *= *(\d+)", re.IGNORECASE)
 # Bytes that one byte can stand for: in a deflate stream, and in a Rice-compressed one, where 32
 # equal pixels of 4 bytes take 6 bits.
 DENSEST_GZIP, DENSEST_RICE = 1032, 171
@@ -61,16 +65,25 @@ def check_claims(file: BinaryIO, size: int) -> None:
 
 
 def _count_cards(file: BinaryIO, start: int, before: int) -> int:
-    """Find the end of the header that starts here, and add its cards to those before it."""
+    """Find the end of the header that starts here, and add its cards to those before it.
+
+    Astropy loops over as many axes and columns as a header claims: it must not see those yet.
+    """
     position = file.tell()
     file.seek(start)
     cards = before
     while cards <= MOST_CARDS:
         block = file.read(BLOCK)
         cards += BLOCK // CARD
-        if any(block[at : at + CARD] == END for at in range(0, len(block), CARD)):
-            file.seek(position)
-            return cards
+        for at in range(0, len(block), CARD):
+            card = block[at : at + CARD]
+            if card == END:
+                file.seek(position)
+                return cards
+            number = _COUNT.match(card)
+            if number and int(number[2]) > MOST_AXES:
+                name, value = number[1].decode(), number[2].decode()
+                raise ValueError(f"{name} is {value} in a header; it is {MOST_AXES} at most.")
         if len(block) < BLOCK:
             raise ValueError("the file is truncated: a header has no END.")
     raise ValueError(f"the headers have more than {MOST_CARDS} cards.")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,12 +101,24 @@ def read_image(
         header = chosen.header.copy()
         data = np.asarray(chosen.data)
         data = data.reshape(data.shape[-2:]).astype(data.dtype.newbyteorder("="))
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _quiet():
         warnings.simplefilter("ignore")
         transform, deviation, in_frame, note = _placed(header, data.shape, observation)
     if max(deviation, in_frame) > LARGEST_DEVIATION:
         warnings.warn(f"{path}: {note}", DistortionWarning, stacklevel=2)
     return FitsImage(data, header, transform, deviation, in_frame, note)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep astropy's remarks on other people's headers off the screen."""
+    logger = logging.getLogger("astropy")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 def _choose(hdus: fits.HDUList, hdu: int | str | None) -> Any:

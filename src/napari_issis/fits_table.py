@@ -69,7 +69,8 @@ def open_fits(path: str | os.PathLike[str]) -> Iterator[fits.HDUList]:
             raise ValueError(f"{path}: {one_line(error)}") from error
         except Exception as error:
             # What astropy raises on a broken file is not restricted to a few types.
-            raise ValueError(f"{path} is damaged: {one_line(error)}") from error
+            fault = f"{type(error).__name__}: {one_line(error)}"
+            raise ValueError(f"{path} is damaged ({fault}).") from error
 
 
 def _unpacked(file: BinaryIO, path: str | os.PathLike[str]) -> BinaryIO:
