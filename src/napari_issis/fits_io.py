@@ -2,8 +2,9 @@
 
 A file holds, in this order,
 
-* the counts as integers in the primary HDU, or compressed without loss in the extension
-  ``COUNTS`` behind an empty primary HDU;
+* an image in the primary HDU, or compressed without loss in the first extension behind an
+  empty primary HDU: the counts as integers, unless another image is asked for;
+* ``COUNTS``, where the image is another one;
 * ``EXPECTED``, the expected counts as 64-bit floats;
 * ``SOURCES``, the source table;
 * ``OBSERVATION``, one row with the exact values of the observation, of which the header's
@@ -34,6 +35,13 @@ from .sources import check_sources
 # Raised when a file of the new layout can no longer be read by the old program.
 LAYOUT = 1
 SUFFIXES = (".fits", ".fit", ".fts")
+# Units of the images that can stand first, and what they are.
+IMAGES = {
+    "counts": ("ct", "detected counts per pixel"),
+    "rate": ("ct/s", "detected counts per pixel and second"),
+    "expected": ("ct", "expected counts per pixel, sources and sky"),
+    "snr": ("", "signal-to-noise ratio per pixel, (C - B) / sqrt(C)"),
+}
 
 
 def write_exposure(
@@ -42,6 +50,8 @@ def write_exposure(
     *,
     overwrite: bool = False,
     compress: bool = False,
+    image: str = "counts",
+    whole: bool = True,
 ) -> None:
     """Write an exposure to a FITS file.
 
@@ -55,39 +65,78 @@ def write_exposure(
         Whether an existing file may be replaced. It is replaced as a whole once the new one
         is complete.
     compress : bool
-        Compress the counts without loss, tile by tile.
+        Compress the images without loss, tile by tile.
+    image : {"counts", "rate", "expected", "snr"}
+        The image that other programs see first: detected counts (integers), counts per
+        second, expected counts, or the signal-to-noise ratio per pixel (64-bit floats).
+    whole : bool
+        Whether all that `read_exposure` needs goes into the file, or the image alone.
 
     Raises
     ------
     ValueError
-        If the name does not end as above, or a column or the PSF cannot be stored.
+        If the name does not end as above, the image is not one of these, or a column or the
+        PSF cannot be stored.
     OSError
         If the file cannot be written; `FileExistsError` if it exists.
     """
-    cards = observation_header(exposure)
+    if image not in IMAGES:
+        raise ValueError(f"image is {image!r}; known: {', '.join(IMAGES)}.")
     wcs = wcs_header(exposure.observation)
-    image = fits.Header([("BUNIT", "ct", "counts per pixel")])
-    image.update(wcs)
-    counts = _smallest(exposure.counts)
+    cards = observation_header(exposure) + _unit(image) + wcs
+    first = _image_of(exposure, image)
     if compress:
-        algorithm = "RICE_1" if counts.dtype.itemsize == 4 else "GZIP_2"
-        hdus = [
-            fits.PrimaryHDU(header=cards),
-            fits.CompImageHDU(counts, cards + image, "COUNTS", compression_type=algorithm),
-        ]
+        hdus = [fits.PrimaryHDU(header=observation_header(exposure)), _packed(first, cards, image)]
     else:
-        hdus = [fits.PrimaryHDU(counts, cards + image)]
-    hdus += [
-        fits.ImageHDU(np.asarray(exposure.expected, dtype=np.float64), image, "EXPECTED"),
-        table_hdu(exposure.sources, "SOURCES"),
-        table_hdu(_record(exposure), "OBSERVATION"),
-    ]
+        hdus = [fits.PrimaryHDU(first, cards)]
+    if whole:
+        for name in ("counts", "expected"):
+            # Uncompressed, the first image has no name to be found by; only counts need none.
+            if name == image and (compress or name == "counts"):
+                continue
+            further = _image_of(exposure, name)
+            if compress and name == "counts":
+                hdus.append(_packed(further, _unit(name) + wcs, name))
+            else:
+                hdus.append(fits.ImageHDU(further, _unit(name) + wcs, name.upper()))
+        hdus += _record_hdus(exposure)
+    with replacing(path, SUFFIXES, overwrite=overwrite) as file:
+        fits.HDUList(hdus).writeto(file, output_verify="exception", checksum=True)
+
+
+def _record_hdus(exposure: Exposure) -> list[Any]:
+    hdus = [table_hdu(exposure.sources, "SOURCES"), table_hdu(_record(exposure), "OBSERVATION")]
     psf = exposure.observation.psf
     if isinstance(psf, ImagePSF):
         scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
         hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
-    with replacing(path, SUFFIXES, overwrite=overwrite) as file:
-        fits.HDUList(hdus).writeto(file, output_verify="exception", checksum=True)
+    return hdus
+
+
+def _image_of(exposure: Exposure, image: str) -> NDArray[Any]:
+    if image == "counts":
+        return _smallest(exposure.counts)
+    if image == "rate":
+        return np.asarray(exposure.counts / exposure.observation.exposure)
+    values = exposure.expected if image == "expected" else exposure.snr
+    return np.asarray(values, dtype=np.float64)
+
+
+def _unit(image: str) -> fits.Header:
+    unit, comment = IMAGES[image]
+    return fits.Header([("BUNIT", unit, comment)])
+
+
+def _packed(image: NDArray[Any], header: fits.Header, name: str) -> fits.CompImageHDU:
+    """Compress without loss: floats are not rounded, and so shrink less."""
+    rice = image.dtype == np.int32
+    return fits.CompImageHDU(
+        image,
+        header,
+        name.upper(),
+        compression_type="RICE_1" if rice else "GZIP_2",
+        quantize_level=0,
+    )
 
 
 def read_exposure(path: str | os.PathLike[str]) -> Exposure:
