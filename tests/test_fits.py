@@ -452,7 +452,9 @@ def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch, whe
     with pytest.raises(expected) as error:
         exposure_of(Observation(shape=(3, 4))).write(path, overwrite=True)
     if expected is OSError:
-        assert sentence(error) == f"cannot write {path}: No space left."
+        assert sentence(error) == (
+            f"cannot write {path}: No space left; free some space or choose another disk."
+        )
     assert path.read_text() == "mine"
     assert os.listdir(tmp_path) == ["x.fits"]
 
@@ -496,7 +498,7 @@ def test_unwritable_targets(tmp_path, monkeypatch):
         raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr("pathlib.Path.open", refuse)
-    with pytest.raises(OSError, match=r"cannot write .*x\.fits: Permission denied\."):
+    with pytest.raises(OSError, match=r"cannot write .*x\.fits: Permission denied; choose"):
         exposure.write(tmp_path / "x.fits")
     assert os.listdir(tmp_path) == ["folder.fits"]
 

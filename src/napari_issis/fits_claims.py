@@ -119,9 +119,13 @@ def _check_table(hdu: Any, name: str) -> None:
     width, rows = _whole(hdu.header, "NAXIS1"), _whole(hdu.header, "NAXIS2")
     if width == 0 and rows > 0:
         raise ValueError(f"table {name} claims {rows} rows of no width.")
-    columns = hdu.columns.dtype.itemsize
+    dtype = hdu.columns.dtype
+    columns = dtype.itemsize
     if columns > width or (columns < width and isinstance(hdu, fits.BinTableHDU)):
         raise ValueError(f"the columns of table {name} take {columns} bytes, its rows {width}.")
+    for column, offset in (field[:2] for field in (dtype.fields or {}).values()):
+        if not 0 <= offset <= width - column.itemsize:
+            raise ValueError(f"a column of table {name} lies outside its rows.")
 
 
 def _check_compressed(hdu: Any, name: str) -> None:
