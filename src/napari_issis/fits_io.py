@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from astropy.coordinates import SkyCoord
 from astropy.io import fits
-from astropy.table import Table
+from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .exposure import Exposure
@@ -99,18 +99,54 @@ def write_exposure(
                 hdus.append(_packed(further, _unit(name) + wcs, name))
             else:
                 hdus.append(fits.ImageHDU(further, _unit(name) + wcs, name.upper()))
-        hdus += _record_hdus(exposure)
+        hdus += scene_hdus(exposure.sources, exposure.observation, exposure.seed, exposure.clipped)
     with replacing(path, SUFFIXES, overwrite=overwrite) as file:
         fits.HDUList(hdus).writeto(file, output_verify="exception", checksum=True)
 
 
-def _record_hdus(exposure: Exposure) -> list[Any]:
-    hdus = [table_hdu(exposure.sources, "SOURCES"), table_hdu(_record(exposure), "OBSERVATION")]
-    psf = exposure.observation.psf
-    if isinstance(psf, ImagePSF):
+def scene_hdus(
+    sources: Table, observation: Observation, seed: int, clipped: float = 0.0
+) -> list[Any]:
+    """Make the extensions from which a scene can be told: sources, observation, seed and PSF.
+
+    Raises
+    ------
+    ValueError
+        If a column or the PSF cannot be stored; the message names it.
+    """
+    record = _record(observation, seed, clipped)
+    hdus = [table_hdu(sources, "SOURCES"), table_hdu(record, "OBSERVATION")]
+    if isinstance(observation.psf, ImagePSF):
+        psf = observation.psf
         scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
         hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
     return hdus
+
+
+def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
+    """Read what `scene_hdus` made: the checked sources, observation, seed and clipped counts.
+
+    Raises
+    ------
+    ValueError
+        If an extension is missing or broken.
+    """
+    names = [hdu.name for hdu in hdus]
+    missing = [name for name in ("SOURCES", "OBSERVATION") if name not in names]
+    if missing:
+        raise ValueError(
+            f"the file holds no napari-issis exposure: it has no extension {missing[0]}."
+        )
+    record = read_table(hdus["OBSERVATION"])
+    if len(record) != 1 or "LAYOUT" not in record.colnames:
+        raise ValueError("the extension OBSERVATION is not that of a napari-issis exposure.")
+    if record["LAYOUT"][0] > LAYOUT:
+        raise ValueError("the file was written by a newer napari-issis; update the program.")
+    row = {name: record[name][0] for name in record.colnames}
+    observation = _observation(row, hdus)
+    sources = read_table(hdus["SOURCES"])
+    check_sources(sources)
+    return sources, observation, int(row["SEED"]), float(row["CLIPPED"])
 
 
 def _image_of(exposure: Exposure, image: str) -> NDArray[Any]:
@@ -161,20 +197,11 @@ def read_exposure(path: str | os.PathLike[str]) -> Exposure:
     """
     with open_fits(path) as hdus:
         names = [hdu.name for hdu in hdus]
-        missing = [name for name in ("EXPECTED", "SOURCES", "OBSERVATION") if name not in names]
-        if missing:
+        if "EXPECTED" not in names:
             raise ValueError(
-                f"the file holds no napari-issis exposure: it has no extension {missing[0]}."
+                "the file holds no napari-issis exposure: it has no extension EXPECTED."
             )
-        record = read_table(hdus["OBSERVATION"])
-        if len(record) != 1 or "LAYOUT" not in record.colnames:
-            raise ValueError("the extension OBSERVATION is not that of a napari-issis exposure.")
-        if record["LAYOUT"][0] > LAYOUT:
-            raise ValueError("the file was written by a newer napari-issis; update the program.")
-        row = {name: record[name][0] for name in record.colnames}
-        observation = _observation(row, hdus)
-        sources = read_table(hdus["SOURCES"])
-        check_sources(sources)
+        sources, observation, seed, clipped = read_scene(hdus)
         counts = _image(hdus["COUNTS" if "COUNTS" in names else 0], observation.shape, "iu")
         expected = _image(hdus["EXPECTED"], observation.shape, "f")
         return Exposure(
@@ -182,8 +209,8 @@ def read_exposure(path: str | os.PathLike[str]) -> Exposure:
             expected=expected.astype(np.float64),
             sources=sources,
             observation=observation,
-            seed=int(row["SEED"]),
-            clipped=float(row["CLIPPED"]),
+            seed=seed,
+            clipped=clipped,
         )
 
 
@@ -204,9 +231,8 @@ def _image(hdu: Any, shape: tuple[int, int], dtype_kinds: str) -> NDArray[Any]:
     return data
 
 
-def _record(exposure: Exposure) -> Table:
+def _record(observation: Observation, seed: int, clipped: float) -> Table:
     """One row with every value that the observation is made of; NaN where there is none."""
-    observation = exposure.observation
     pointing = observation.pointing
     psf = observation.effective_psf
     values: dict[str, Any] = {
@@ -223,8 +249,8 @@ def _record(exposure: Exposure) -> Table:
         "DEC": np.nan if pointing is None else float(pointing.dec.deg),
         "ROLL": observation.roll,
         # as text: a seed may exceed 64 bits
-        "SEED": str(exposure.seed),
-        "CLIPPED": float(exposure.clipped),
+        "SEED": str(seed),
+        "CLIPPED": float(clipped),
         "PSF_ASSUMED": observation.psf_assumed,
         "PSF_TYPE": type(psf).__name__,
         **_psf_values(psf),

@@ -22,6 +22,7 @@ from .reading import one_line, open_file
 # A packed file is unpacked in memory, up to so many bytes.
 MOST_UNPACKED = 256 * 2**20
 GZIP = b"\x1f\x8b"
+ESCAPED = "ESCAPED"
 VARIABLE = re.compile(r"\d*[PQ]")
 
 
@@ -97,7 +98,8 @@ def table_hdu(table: Table, name: str) -> fits.BinTableHDU:
     Parameters
     ----------
     table : astropy.table.Table
-        Columns of numbers or ASCII text. Masked numbers become NaN, masked text is empty.
+        Columns of numbers or text. Masked numbers become NaN, masked text is empty. Where
+        anything is not printable ASCII, all names and text are escaped.
     name : str
         Name of the extension.
 
@@ -106,21 +108,41 @@ def table_hdu(table: Table, name: str) -> fits.BinTableHDU:
     ValueError
         If a column cannot be stored; the message names it.
     """
-    plain = Table()
-    for column in table.colnames:
-        plain[column] = _storable(column, table[column])
-    try:
-        hdu = fits.table_to_hdu(plain)
-    except UnicodeEncodeError as error:
-        raise ValueError(
-            f"the table holds the text {str(error.object)!r}; FITS tables take ASCII text only."
-        ) from error
-    for column in table.colnames:
+    plain = Table({column: _storable(column, table[column]) for column in table.colnames})
+    escaped = _needs_escape(plain)
+    if escaped:
+        plain = Table({_escape(name): _escape_values(plain[name]) for name in plain.colnames})
+    hdu = fits.table_to_hdu(plain)
+    for stored, column in zip(plain.colnames, table.colnames, strict=True):
         unit = getattr(table[column], "unit", None)
         if unit is not None:
-            hdu.columns[column].unit = _unit_text(column, unit)
+            hdu.columns[stored].unit = _unit_text(column, unit)
+    if escaped:
+        hdu.header[ESCAPED] = (True, "names and text as Python's unicode_escape")
     hdu.name = name
     return hdu
+
+
+def _needs_escape(table: Table) -> bool:
+    """Whether a name or text is not what FITS takes: printable ASCII."""
+    if not all(name.isascii() and name.isprintable() for name in table.colnames):
+        return True
+    texts = (table[name] for name in table.colnames if table[name].dtype.kind == "U")
+    return any(not (text.isascii() and text.isprintable()) for column in texts for text in column)
+
+
+def _escape(text: str) -> str:
+    return text.encode("unicode_escape").decode("ascii")
+
+
+def _escape_values(column: Any) -> Any:
+    if column.dtype.kind != "U":
+        return column
+    return np.array([_escape(str(text)) for text in column], dtype=str)
+
+
+def _unescape(text: Any) -> str:
+    return str(text).encode("ascii").decode("unicode_escape")
 
 
 def _storable(name: str, column: Any) -> Any:
@@ -129,7 +151,7 @@ def _storable(name: str, column: Any) -> Any:
     dtype = np.asarray(values).dtype
     if dtype.kind == "O" and all(isinstance(v, str) for v in values):
         values, dtype = np.asarray(values, dtype=str), np.dtype(str)
-    if dtype.kind not in "fiubUS":
+    if dtype.kind not in "fiubcUS":
         raise ValueError(
             f"column {name} is neither numbers nor text ({type(column).__name__}); "
             "remove it to save the table as FITS."
@@ -175,6 +197,7 @@ def read_table(hdu: fits.BinTableHDU) -> QTable:
         hdu.columns.del_col(name)
     units = {column.name: column.unit for column in hdu.columns}
     plain = Table.read(hdu, mask_invalid=False)
+    escaped = hdu.header.get(ESCAPED) is True
     table = QTable()
     for name in plain.colnames:
         column = plain[name]
@@ -182,6 +205,10 @@ def read_table(hdu: fits.BinTableHDU) -> QTable:
         values = np.ma.asarray(column) if masked else np.asarray(column)
         values = values.astype(values.dtype.newbyteorder("="))
         unit = parse_unit(units[name]) if units.get(name) else None
+        if escaped:
+            name = _unescape(name)
+            if values.dtype.kind in "US":
+                values = np.array([_unescape(text) for text in values.astype(str)], dtype=str)
         if unit is not None and not masked and values.dtype.kind == "f":
             table[name] = values * unit
         else:
