@@ -188,6 +188,8 @@ def test_magnitudes(tmp_path):
     assert "FUVmag -> flux (taken as AB magnitudes, at the channel's pivot" in catalogue.notes[0]
     assert "1 further column kept: NUVmag" in catalogue.notes
     assert "no column flux; it needs flux or mag" in refused(tmp_path, rows("x,y,Vmag", (1, 2, 3)))
+    unmeasured = rows("x,y,mag", (1, 2, 99), (1, 2, 20))
+    assert "1 of them above 40: does this" in read(tmp_path, unmeasured).notes[1]
     assert "row 0, mag: the value is missing" in refused(tmp_path, "x,y,mag\n1,2,\n")
 
 
@@ -342,7 +344,7 @@ def test_a_fits_table_with_lists(tmp_path):
 
 @pytest.mark.parametrize("ending", ["ecsv", "csv", "fits", "vot"])
 def test_a_hundred_thousand_rows_load_in_seconds(tmp_path, ending):
-    """Catches a loop over rows that is slower than reading them (some 1.5 s at most here)."""
+    """Catches a loop over rows that is slower than reading them (2.5 s at most here)."""
     table = Table({"RAJ2000": 150 + np.linspace(0, 1e-3, 100_000)})
     table["DEJ2000"], table["mag"], table["r_e"] = 60.0, 20.0, 1.0
     if ending == "csv":
@@ -350,6 +352,6 @@ def test_a_hundred_thousand_rows_load_in_seconds(tmp_path, ending):
         table["DEJ2000"] = ["+60 00 00.1"] * 100_000
     format_ = {"vot": "votable", "fits": "fits"}.get(ending, f"ascii.{ending}")
     table.write(tmp_path / f"t.{ending}", format=format_)
-    start = time.perf_counter()
+    start = time.process_time()
     assert len(read_sources(tmp_path / f"t.{ending}", FRAME)) == 100_000
-    assert time.perf_counter() - start < 8
+    assert time.process_time() - start < 8

@@ -300,7 +300,7 @@ def test_a_catalogue_with_positions_on_the_sky(capsys):
     observation = exposure.observation
     assert exposure == simulate(read_sources("sky.csv", observation), observation)
     assert exposure.sources["x"][0] == pytest.approx(23.5)
-    assert "give the observation a pointing" in refused(
+    assert "give the frame's with --pointing" in refused(
         capsys, "simulate", "sky.csv", "--output", "y.fits"
     )
     for pointing in ("here", "1 2 3 4", "10 95"):

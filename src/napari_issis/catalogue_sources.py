@@ -31,6 +31,8 @@ DEFAULT_UNITS = {
     "n": u.dimensionless_unscaled,
 }
 MOST_COLUMNS = 2000
+# Catalogues write 99 for a magnitude that was not measured.
+FAINTEST = 40.0
 _SEXAGESIMAL = re.compile(
     r"\s*([+-]?)(\d{1,3})(?:[:hd°]\s*|\s+)(\d{1,2})(?:[:m'′]\s*|\s+)(\d{1,2}(?:\.\d*)?)[s\"″]?\s*"
 )
@@ -169,6 +171,11 @@ class _Reading:
                 self.put("flux", values * (system or u.ABmag), meaning.column)
                 how = f"{system or 'taken as AB magnitudes'}, {where}"
                 self.note(meaning.column, "flux", how)
+                faint = int((values > FAINTEST).sum())
+                if faint:
+                    self.notes.append(
+                        f"{faint} of them above {FAINTEST:g}: does this stand for no measurement?"
+                    )
                 return
         raise ValueError("the source table has no column flux; it needs flux or mag.")
 

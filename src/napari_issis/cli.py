@@ -75,7 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except FileExistsError as error:
         _Parser().error(str(error).replace("overwrite=True", "--overwrite"))
     except (ValueError, OSError) as error:
-        _Parser().error(str(error))
+        asked = "give the observation a pointing"
+        _Parser().error(str(error).replace(asked, "give the frame's with --pointing"))
     except MemoryError:
         _Parser().error("there is not enough memory; choose a smaller frame.")
     except KeyboardInterrupt:
