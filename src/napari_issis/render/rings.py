@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from ..psf import RadialPSF
+from .hankel import hankel_nodes
 from .optics import Optics, Transfer
 
 if TYPE_CHECKING:
@@ -134,14 +135,9 @@ def _envelope(plan: Plan, level: int, start: float) -> tuple[Array, Array]:
     """
     psf = plan.optics.psf
     assert isinstance(psf, RadialPSF)
-    limit = plan.highest
     r = start * np.geomspace(1.0, 6.0, 160)
-    # Gauss-Legendre on panels of less than two oscillations each
-    x, w = np.polynomial.legendre.leggauss(16)
-    panels = int(limit * r[-1]) + 8
-    k = ((np.arange(panels)[:, None] + 0.5 * (x + 1)) * (limit / panels)).ravel()
-    weight = np.tile(w, panels)
-    measure = weight * k * psf.otf(k / plan.optics.pixel_scale)
+    k, measure = hankel_nodes(plan.highest, r[-1])
+    measure *= psf.otf(k / plan.optics.pixel_scale)
     # for the peak, the pixel as a Gaussian of the same variance
     peak = abs(np.sum(measure * np.exp(-(np.pi**2) * k**2 / 6)))
     # a ring is averaged least in the direction of the pixel's sides: the envelope of sinc(k)
