@@ -24,7 +24,7 @@ from .optics import Transfer
 from .painting import half_patch, half_patches, paint
 from .plan import NEAR_UNIT, Plan, spread_cut
 from .rings import Band, band_transfer
-from .threads import in_threads
+from .threads import for_each
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
@@ -175,8 +175,7 @@ def _filtered(rows: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
     def transform_rows(block: slice) -> None:
         half[block] = fft.rfft(rows[block, : x.count], axis=1)
 
-    for _ in in_threads(transform_rows, _blocks(y.count, ROWS)):
-        pass
+    for_each(transform_rows, _blocks(y.count, ROWS))
     radial = filtered.shape[0] == y.modes + 1
     folded = np.empty((y.period, x.modes + 1), dtype=np.complex128)
 
@@ -188,8 +187,7 @@ def _filtered(rows: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
         lower *= weight[:0:-1] if radial else weight[y.modes + 1 :]
         fold_rows(upper, lower, y.period, folded[:, columns])
 
-    for _ in in_threads(fold_columns, _blocks(x.modes + 1, COLUMNS)):
-        pass
+    for_each(fold_columns, _blocks(x.modes + 1, COLUMNS))
     return fold_half(folded, x.period)
 
 

@@ -56,3 +56,8 @@ def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterato
             yield ahead.popleft().result()
     while ahead:
         yield ahead.popleft().result()
+
+
+def for_each(work: Callable[[Item], None], items: Iterable[Item]) -> None:
+    """Do ``work`` for every item."""
+    deque(in_threads(work, items), maxlen=0)
