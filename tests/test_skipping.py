@@ -10,7 +10,7 @@ from astropy.table import vstack
 import napari_issis as ni
 from napari_issis import render
 from napari_issis.exposure import noise_ready_rate
-from napari_issis.render import discs, near, painting, profiles, rings, stamps
+from napari_issis.render import discs, near, painting, profiles, rings, stamps, windows
 from watching import refuse, watch, watch_transforms
 
 SHAPE = (120, 100)
@@ -195,7 +195,7 @@ def test_stars_out_of_reach_are_not_on_the_fine_mesh(psf, monkeypatch):
 
 @each_psf
 def test_stars_out_of_reach_have_no_stamps(psf, monkeypatch):
-    stamped = watch(monkeypatch, stamps._place)
+    stamped = watch(monkeypatch, windows.place)
     far = scene("point", 1)
     far["x"] += 3000.0
     ni.count_rate(vstack([scene("point", 1), far]), observed(psf))
