@@ -74,10 +74,9 @@ class MovingSource:
         turned = self.spectrum * np.exp(-2j * np.pi * self.ky * (y - row))[:, None]
         turned *= np.exp(-2j * np.pi * self.kx * (x - column))
         upper = self.ky.size // 2 + 1
-        folded = np.empty((self.period[0], self.kx.size), dtype=np.complex128)
-        fold_rows(turned[:upper], turned[upper:], self.period[0], folded)
-        own = fft.irfft2(fold_half(folded, self.period[1]), self.period)
-        return place(image, own[:ny, :nx], row, column)
+        columns = fft.ifft(fold_rows(turned[:upper], turned[upper:], self.period[0]), axis=0)[:ny]
+        own = fft.irfft(fold_half(columns, self.period[1]), self.period[1], axis=1)[:, :nx]
+        return place(image, own, row, column)
 
 
 def moving_source(

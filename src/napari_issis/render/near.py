@@ -40,12 +40,14 @@ COLUMNS = 48
 class Axis:
     """One axis: position of the first point, period in pixels, points, and kept frequencies.
 
-    The frequencies are the multiples of 1 / period from 0 to ``modes``.
+    Only the first ``painted`` of the ``count`` points may hold anything. The frequencies are the
+    multiples of 1 / period from 0 to ``modes``.
     """
 
     start: int
     period: int
     count: int
+    painted: int
     modes: int
 
 
@@ -95,19 +97,14 @@ def near_rate(
             "fits into memory; choose a smaller frame, a larger tolerance or a wider PSF."
         )
     # room for the transform of each row in its own place
-    rows = np.zeros((y.count, 2 * (x.count // 2 + 1)))
-    mesh = rows[:, : x.count]
+    rows = np.zeros((y.painted, 2 * (x.count // 2 + 1)))
+    mesh = rows[:, : x.painted]
     start, cell, spread = (float(y.start), float(x.start)), plan.near_cell, plan.near_spread()
     paint(mesh, start, cell, gaussians, spread, cut)
     paint_discs(mesh, start, cell, discs, disc_rate, spread, plan.digits)
     if len(large):
         paint_large_discs(mesh, start, cell, large, large_rate, spread, plan.digits)
-    spectrum = _filtered(rows, y, x, _filter(plan.filters, y.period, x.period))
-    del mesh, rows
-    values = fft.irfft2(spectrum, (y.period, x.period), workers=-1, overwrite_x=True)
-    in_y, in_x = np.arange(shape[0]) - y.start, np.arange(shape[1]) - x.start
-    wanted: Array = values[np.ix_(in_y % y.period, in_x % x.period)]
-    return wanted
+    return _at_pixels(rows, y, x, _filter(plan.filters, y.period, x.period), shape)
 
 
 def _axes(
@@ -137,7 +134,10 @@ def _axes(
         start = int(np.floor(low))
         need = max(high - start, shape[axis] - 1 + reach - low, high + reach) + 1
         period = NEAR_UNIT * fft.next_fast_len(int(np.ceil(need / NEAR_UNIT)), real=True)
-        axes.append(Axis(start, period, round(period / cell), int(plan.highest * period)))
+        count = round(period / cell)
+        # what covers everything must not end, not even out of reach
+        painted = count if large else min(int((high - start) / cell) + 2, count)
+        axes.append(Axis(start, period, count, painted, int(plan.highest * period)))
     return axes[0], axes[1]
 
 
@@ -165,30 +165,41 @@ def high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
     return band_transfer(plan, Band(-1, -1, 0), ky, kx, limit)
 
 
-def _filtered(rows: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
-    """Half-spectrum at the pixel rate of a mesh, filtered, all aliases summed.
+def _at_pixels(rows: Array, y: Axis, x: Axis, filtered: Transfer, shape: tuple[int, int]) -> Array:
+    """Filter a mesh, sum all aliases and invert at the frame's pixels.
 
-    ``rows`` holds the mesh in its first columns and is overwritten.
+    ``rows`` holds the mesh in its first columns and is overwritten. Along each axis only what
+    is painted is transformed, and only what is wanted is kept.
     """
     half = rows.view(np.complex128)
 
     def transform_rows(block: slice) -> None:
-        half[block] = fft.rfft(rows[block, : x.count], axis=1)
+        half[block] = fft.rfft(rows[block, : x.painted], x.count, axis=1)
 
-    for_each(transform_rows, _blocks(y.count, ROWS))
+    for_each(transform_rows, _blocks(y.painted, ROWS))
     radial = filtered.shape[0] == y.modes + 1
-    folded = np.empty((y.period, x.modes + 1), dtype=np.complex128)
+    in_y, in_x = (
+        (np.arange(n) - axis.start) % axis.period for n, axis in zip(shape, (y, x), strict=True)
+    )
+    inverted = np.empty((shape[0], x.modes + 1), dtype=np.complex128)
 
-    def fold_columns(columns: slice) -> None:
-        spectrum = fft.fft(half[:, columns], axis=0)
+    def invert_columns(columns: slice) -> None:
+        spectrum = fft.fft(half[:, columns], y.count, axis=0)
         weight = filtered[:, columns]
         upper, lower = spectrum[: y.modes + 1], spectrum[y.count - y.modes :]
         upper *= weight[: y.modes + 1]
         lower *= weight[:0:-1] if radial else weight[y.modes + 1 :]
-        fold_rows(upper, lower, y.period, folded[:, columns])
+        folded = fold_rows(upper, lower, y.period)
+        inverted[:, columns] = fft.ifft(folded, axis=0, overwrite_x=True)[in_y]
 
-    for_each(fold_columns, _blocks(x.modes + 1, COLUMNS))
-    return fold_half(folded, x.period)
+    for_each(invert_columns, _blocks(x.modes + 1, COLUMNS))
+    wanted = np.empty(shape)
+
+    def invert_rows(block: slice) -> None:
+        wanted[block] = fft.irfft(fold_half(inverted[block], x.period), x.period, axis=1)[:, in_x]
+
+    for_each(invert_rows, _blocks(shape[0], ROWS))
+    return wanted
 
 
 def _blocks(count: int, size: int) -> Iterator[slice]:
