@@ -246,8 +246,9 @@ def make_plan(
             return _with_rings_cut(wide, farthest)
     mesh = _with_rings_cut(Plan(optics, digits, ring_digits, 1.0, near="mesh"), farthest)
     stamps = replace(mesh, near="stamps")
-    if not meshes_only and mesh._has_rings(-1):
-        wrapped = _wrapped(mesh, farthest, seen)
+    shorter = any(2 * d < n + mesh.reach(-1) for d, n in zip(seen, shape, strict=True))
+    if shorter and mesh._has_rings(-1) and not meshes_only:
+        wrapped = _wrapped(mesh, seen)
         if _mesh_seconds(wrapped, shape, points) < _mesh_seconds(mesh, shape, points):
             mesh = wrapped
     if meshes_only or _mesh_seconds(mesh, shape, points) < _stamp_seconds(stamps, points, extended):
@@ -267,12 +268,12 @@ def _with_rings_cut(plan: Plan, farthest: float, *, always: bool = False) -> Pla
     return replace(plan, ring_fade=0.5 * float(np.ceil(2 * max(fade, 1.0))))
 
 
-def _wrapped(plan: Plan, farthest: float, seen: tuple[float, float]) -> Plan:
+def _wrapped(plan: Plan, seen: tuple[float, float]) -> Plan:
     """Let the fine mesh's kernel wrap around beyond the distances seen.
 
     The rings are cut beyond these in any case, so that the kernel comes to an end.
     """
-    plan = _with_rings_cut(replace(plan, ring_cut=np.inf), max(farthest, *seen), always=True)
+    plan = _with_rings_cut(replace(plan, ring_cut=np.inf), float(np.hypot(*seen)), always=True)
     fade = wrap_fade(plan, -1, plan._without_rings(-1), min(seen))
     return replace(plan, seen=seen, wrap_fade=0.25 * float(np.ceil(4 * max(fade, 1.0))))
 
