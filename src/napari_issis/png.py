@@ -40,8 +40,9 @@ def write_png(
     *,
     scale: str = "linear",
     limits: tuple[float, float] | None = None,
-    colormap: str = "gray",
+    colormap: str | NDArray[np.uint8] = "gray",
     zoom: int = 1,
+    words: dict[str, str] | None = None,
     overwrite: bool = False,
 ) -> None:
     """Write an image to a PNG file, one image pixel a PNG pixel unless magnified.
@@ -57,10 +58,13 @@ def write_png(
         log(1000 v + 1) / log(1001) (as in SAOImage DS9) or sqrt(v).
     limits : (float, float), optional
         Values drawn darkest and brightest; by default the image's finite extremes.
-    colormap : {"gray", "gray_r", "heat"}
-        Black to white, white to black, or black over red and yellow to white.
+    colormap : {"gray", "gray_r", "heat"} or ndarray of uint8, shape (256, 3)
+        Black to white, white to black, or black over red and yellow to white; or colours from
+        dark to bright.
     zoom : int
         Side of the square that each image pixel becomes, 1 to 64.
+    words : dict of str, optional
+        PNG text beside, or in place of, that below.
     overwrite : bool
         Whether an existing file may be replaced.
 
@@ -80,15 +84,18 @@ def write_png(
         raise ValueError(f"a PNG shows an image of two dimensions; this one's are {values.shape}.")
     if scale not in SCALES:
         raise ValueError(f"scale is {scale!r}; known: {', '.join(SCALES)}.")
-    if colormap not in COLORMAPS:
+    if isinstance(colormap, str) and colormap not in COLORMAPS:
         raise ValueError(f"colormap is {colormap!r}; known: {', '.join(COLORMAPS)}.")
     _check_zoom(zoom, values.shape)
     low, high = _limits(values, limits)
     brightness = np.rint(255 * _stretch(scale)(_normalised(values, low, high))).astype(np.uint8)
     magnified = np.flipud(brightness).repeat(zoom, axis=0).repeat(zoom, axis=1)
-    picture = Image.fromarray(_colours(colormap)[magnified])
-    words = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Colormap": colormap}
-    _save(picture, path, {**words, "Zoom": str(zoom)}, overwrite=overwrite)
+    colours = _colours(colormap) if isinstance(colormap, str) else colormap
+    picture = Image.fromarray(colours[magnified])
+    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
+    if isinstance(colormap, str):
+        text["Colormap"] = colormap
+    _save(picture, path, text | (words or {}), overwrite=overwrite)
 
 
 def write_source_png(
