@@ -112,7 +112,7 @@ FITS = {
 def refused(read, path, content, message):
     path.write_bytes(content)
     before = peak_megabytes()
-    with time_limit(), pytest.raises(ValueError, match=message) as error:
+    with time_limit(), pytest.raises(ValueError, match=message or None) as error:
         read(path)
     assert "\n" not in str(error.value)
     assert len(str(error.value)) < 400

@@ -71,7 +71,7 @@ def write_rgba(path: str | os.PathLike[str], counts: ArrayLike, *, overwrite: bo
                 f"the counts {bad} at [y, x] = [{y}, {x}] do not fit into RGBA data, which hold "
                 f"0 to {LARGEST}; write FITS instead."
             )
-    colours = np.flipud(values).astype("<u4") | np.uint32(255 << 24)
+    colours = (np.flipud(values).astype(np.uint32) | np.uint32(255 << 24)).astype("<u4")
     picture = Image.fromarray(colours.view(np.uint8).reshape(*values.shape, 4), "RGBA")
     text = PngInfo()
     text.add_text("Software", "napari-issis")
