@@ -14,6 +14,7 @@ from .observation import Observation
 from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
+from .source_counts import signal_to_noise
 from .sources import source
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ __all__ = [
     "read_rgba",
     "read_sources",
     "show",
+    "signal_to_noise",
     "simulate",
     "source",
     "star_cluster",
