@@ -275,6 +275,10 @@ class SourceEditor:
 
     def _adopt(self, view: SourceLayer) -> None:
         """Bring the table in step with one layer."""
+        if view.only_moved():
+            self.sources = self._moved(view)
+            view.note_geometry()
+            return
         mine = np.isin(self.source_id, view.source_id)
         if view.layer is None:
             self._bury(mine)
@@ -312,6 +316,17 @@ class SourceEditor:
                 view.in_step(self.sources[order], self.source_id[order])
         else:
             view.note_geometry()
+
+    def _moved(self, view: SourceLayer) -> QTable:
+        """Return the table with what was moved, resized or turned; the rest is not copied."""
+        rows, part = view.moved_part(self.sources, self._places(view.source_id))
+        # the columns are shared with the old table, and those that change replaced
+        table = QTable(self.sources, copy=False)
+        for name in ("x", "y", "r_half", "ellipticity", "pa"):
+            column = self.sources[name].copy()
+            column[rows] = part[name]
+            table[name] = column
+        return table
 
     def _drawn(self, view: SourceLayer, row: int) -> QTable:
         """Return the table row of a source that was drawn (as the form says) or pasted."""
