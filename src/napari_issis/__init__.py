@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 from .cluster_profile import ClusterProfile
 from .drag import Drag
 from .exposure import Exposure, simulate
+from .filters import Filter
 from .image_psf import ImagePSF
 from .limits import CountRateWarning
 from .observation import Observation
 from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
+from .sky import SKIES, Sky
 from .sources import source
 
 if TYPE_CHECKING:
@@ -24,14 +26,17 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "SKIES",
     "ClusterProfile",
     "CountRateWarning",
     "Drag",
     "Exposure",
+    "Filter",
     "GaussianPSF",
     "ImagePSF",
     "MoffatPSF",
     "Observation",
+    "Sky",
     "TelescopePSF",
     "count_rate",
     "random_sources",

@@ -217,7 +217,7 @@ def _expose(
     light = max(exposure.expected.sum() - sky, 0.0) / observation.exposure
     print(
         f"{len(exposure.sources)} sources, {ny} x {nx} pixels, {observation.channel}, "
-        f"{'-'.join(observation.filters)}, {observation.exposure:g} s, seed {exposure.seed}"
+        f"{'-'.join(observation.filter_names)}, {observation.exposure:g} s, seed {exposure.seed}"
     )
     print(
         f"sources {light:.4g} cps in the frame, brightest pixel {exposure.counts.max()} counts, "

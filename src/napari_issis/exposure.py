@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .counts import checked_seed, poisson_counts
 from .limits import CountRateWarning, count_rate_warnings
-from .observation import OPEN, Observation
+from .observation import Observation
 from .render import render
 
 
@@ -133,21 +133,21 @@ def noise_ready_rate(
     """Count rate of the sources with ripple below zero removed, and the largest one removed.
 
     Accurate enough for drawing counts, see `simulate`. Independent of the exposure time; the
-    neutral filters scale the rate at open-open and render nothing.
+    neutral filters scale the rate without them and render nothing.
     """
-    transmittance = observation.transmittance
+    transmittance = observation.neutral_transmittance
     absolute = None
     if tolerance is None:
         tolerance, absolute = accuracy_for_counts(observation)
     rate = render(
-        sources, observation.replace(filters=OPEN), tolerance=tolerance, absolute=absolute
+        sources, observation.without_neutral_filters(), tolerance=tolerance, absolute=absolute
     )
     lowest = float(rate.min(initial=0.0))
     return np.maximum(rate, 0.0) * transmittance, abs(min(lowest, 0.0)) * transmittance
 
 
 def accuracy_for_counts(observation: Observation) -> tuple[float, float | None]:
-    """Error of the rate at open-open with which counts may be drawn.
+    """Error of the rate without neutral filters with which counts may be drawn.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def accuracy_for_counts(observation: Observation) -> tuple[float, float | None]:
         Largest error in cps per pixel: 1 % of the sky, rounded down to a power of ten, so that
         skies that differ a little share a render.
     """
-    sky = observation.replace(filters=OPEN).sky_rate
+    sky = observation.without_neutral_filters().sky_rate
     if sky <= 0:
         return 1e-8, None
     return 1e-6, float(10.0 ** np.floor(np.log10(0.01 * sky)))
