@@ -97,6 +97,4 @@ def _weights(optics: Optics) -> tuple[Array, Array]:
 
 
 def _arrays(sources: Table, observation: Observation) -> SourceArrays:
-    return check_sources(
-        sources, pivot=observation.channel_data.pivot, pixel_scale=observation.pixel_scale
-    )
+    return check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
