@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from astropy.io import fits
 
+from .fits_light_path import sky_description
 from .image_psf import ImagePSF
 from .instrument import PSF_NOTE
 from .observation import Observation
@@ -34,14 +35,15 @@ def observation_header(exposure: Exposure) -> fits.Header:
     header["TELESCOP"] = ("WSO-UV", "telescope")
     header["INSTRUME"] = (observation.instrument, "camera")
     header["CHANNEL"] = (observation.channel, "channel of the camera")
-    header["FILTER1"] = (observation.filters[0], "filter in wheel 1")
-    header["FILTER2"] = (observation.filters[1], "filter in wheel 2")
+    header["FILTER1"] = (observation.filter_names[0], "filter in wheel 1")
+    header["FILTER2"] = (observation.filter_names[1], "filter in wheel 2")
     header["WAVEMIN"] = (low, "[Angstrom] lower end of the band")
     header["WAVEMAX"] = (high, "[Angstrom] upper end of the band")
     header["EXPTIME"] = (observation.exposure, "[s] exposure time")
     header["OBSTYPE"] = ("SIMULATION", "no real observation")
     header["CPSFLUX"] = (observation.cps_per_flux, "[ct/s] for 1 erg/s/cm2/A, with filters")
     header["SKYRATE"] = (observation.sky_rate, "[ct/s/pixel] sky, with filters")
+    header["SKYMODEL"] = (sky_description(observation), "how the sky was chosen")
     header["SKYCOUNT"] = (exposure.background, "[ct/pixel] expected sky in the exposure")
     header["PIXSCALE"] = (observation.pixel_scale, "[arcsec] size of a pixel")
     header["PSFTYPE"] = (type(psf).__name__, "kind of point spread function")

@@ -8,7 +8,8 @@ A file holds, in this order,
 * ``SOURCES``, the source table;
 * ``OBSERVATION``, one row with the exact values of the observation, of which the header's
   cards are the readable copy;
-* ``PSF``, where an image serves as the PSF.
+* ``PSF``, where an image serves as the PSF;
+* ``FILTER1``, ``FILTER2``, where a curve of the user's serves as a filter.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from .exposure import Exposure
 from .fits_header import observation_header, wcs_header
+from .fits_light_path import filter_hdus, sky_values, stored_filters, stored_sky
 from .fits_table import open_fits, read_table, table_hdu
 from .image_psf import ImagePSF
 from .observation import Observation
@@ -60,7 +62,7 @@ def write_exposure(
     Raises
     ------
     ValueError
-        If the name does not end as above, or a column or the PSF cannot be stored.
+        If the name does not end as above, or a column, the PSF or the sky cannot be stored.
     OSError
         If the file cannot be written; `FileExistsError` if it exists.
     """
@@ -86,6 +88,7 @@ def write_exposure(
     if isinstance(psf, ImagePSF):
         scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
         hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
+    hdus += filter_hdus(exposure.observation)
     with replacing(path, SUFFIXES, overwrite=overwrite) as file:
         fits.HDUList(hdus).writeto(file, output_verify="exception", checksum=True)
 
@@ -164,8 +167,8 @@ def _record(exposure: Exposure) -> Table:
         "LAYOUT": LAYOUT,
         "INSTRUME": observation.instrument,
         "CHANNEL": observation.channel,
-        "FILTER1": observation.filters[0],
-        "FILTER2": observation.filters[1],
+        "FILTER1": observation.filter_names[0],
+        "FILTER2": observation.filter_names[1],
         "EXPOSURE": observation.exposure,
         "NY": observation.shape[0],
         "NX": observation.shape[1],
@@ -179,6 +182,7 @@ def _record(exposure: Exposure) -> Table:
         "PSF_ASSUMED": observation.psf_assumed,
         "PSF_TYPE": type(psf).__name__,
         **_psf_values(psf),
+        **sky_values(observation.sky),
     }
     return Table({name: [value] for name, value in values.items()})
 
@@ -191,13 +195,14 @@ def _observation(row: dict[str, Any], hdus: fits.HDUList) -> Observation:
     return Observation(
         instrument=str(row["INSTRUME"]),
         channel=str(row["CHANNEL"]),
-        filters=(str(row["FILTER1"]), str(row["FILTER2"])),
+        filters=stored_filters(row, hdus),
         exposure=float(row["EXPOSURE"]),
         shape=(int(row["NY"]), int(row["NX"])),
         psf=None if row["PSF_ASSUMED"] else _psf(row, hdus),
         background=None if np.isnan(background) else background,
         pointing=pointing,
         roll=float(row["ROLL"]),
+        sky=stored_sky(row),
     )
 
 
