@@ -94,10 +94,11 @@ class Observation:
                 )
         if not self.passband.transmittance > 0:
             low, high = self.passband.band
-            names = " and ".join(one.name for one in self.passband.filters)
+            curves = self.passband.filters
+            names = " and ".join(one.name for one in curves)
             raise ValueError(
-                f"{names} passes nothing of {self.channel}, {low:g} to {high:g} A; "
-                "choose another filter or channel."
+                f"{names} {'pass' if len(curves) > 1 else 'passes'} nothing of {self.channel}, "
+                f"{low:g} to {high:g} A; choose another filter or channel."
             )
         set_(self, "exposure", _number("exposure", self.exposure, "seconds", positive=True))
         set_(self, "shape", _shape(self.shape))
