@@ -110,7 +110,9 @@ def test_a_line_passes_at_its_wavelength_and_a_continuum_over_the_band():
     """Catches a filter that dims the whole sky alike."""
     sky = ni.Sky("none", "high", "high")
     open_ = ni.Observation(sky=sky).sky_components
-    behind = ni.Observation(sky=sky, filters=(CURVE, "NF1")).sky_components
+    observation = ni.Observation(sky=sky, filters=(CURVE, "NF1"))
+    behind = observation.sky_components
+    assert observation.sky_rate == pytest.approx(sum(behind.values()), rel=1e-12, abs=0)
     line = 0.6 - 0.3 * 0.71  # at 2471 A
     assert behind["[O II] 2471"] == pytest.approx(0.1 * line * open_["[O II] 2471"], rel=1e-10)
     at = np.arange(1800.0, 3300.0, 100.0)

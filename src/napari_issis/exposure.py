@@ -122,7 +122,9 @@ def simulate(
     observation = Observation() if observation is None else observation
     seed = checked_seed(seed)
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
-    for message in count_rate_warnings(rate, observation.sky_rate):
+    for message in count_rate_warnings(
+        rate, observation.sky_rate, sources=sources, observation=observation
+    ):
         warnings.warn(message, CountRateWarning, stacklevel=2)
     return expose(rate, sources, observation, seed=seed, clipped=clipped)
 
