@@ -37,7 +37,7 @@ def bright_sources(
         lies on the light of another one is left out: each gives a tenth of the rate there, or
         more, by an estimate of its own highest pixel. Centres outside the frame are not seen.
     """
-    limit = LIMITS.local - observation.sky_rate
+    limit = LIMITS.local - observation.background_rate
     if rate.size == 0 or len(sources) == 0 or rate.max() <= limit:
         return np.empty(0, dtype=np.int64)
     arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)

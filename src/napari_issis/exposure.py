@@ -26,7 +26,7 @@ class Exposure:
     counts : ndarray of int64, shape (ny, nx)
         Detected counts; row 0 is drawn at the bottom.
     expected : ndarray of float64, shape (ny, nx)
-        Expected counts, sources and sky.
+        Expected counts: sources, sky and dark rate.
     sources : astropy.table.QTable
         The source table.
     observation : Observation
@@ -46,8 +46,8 @@ class Exposure:
 
     @property
     def background(self) -> float:
-        """Expected sky counts per pixel, B = beta T."""
-        return self.observation.sky_rate * self.observation.exposure
+        """Expected counts per pixel without sources, B = beta T; sky and dark rate."""
+        return self.observation.background_rate * self.observation.exposure
 
     @property
     def snr(self) -> NDArray[np.float64]:
@@ -123,7 +123,7 @@ def simulate(
     seed = checked_seed(seed)
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
     for message in count_rate_warnings(
-        rate, observation.sky_rate, sources=sources, observation=observation
+        rate, observation.background_rate, sources=sources, observation=observation
     ):
         warnings.warn(message, CountRateWarning, stacklevel=2)
     return expose(rate, sources, observation, seed=seed, clipped=clipped)
@@ -173,7 +173,7 @@ def expose(
     seed: int = 0,
     clipped: float = 0.0,
 ) -> Exposure:
-    """Add the sky, expose and draw the counts; renders nothing.
+    """Add sky and dark rate, expose and draw the counts; renders nothing.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def expose(
     clipped : float
         Largest negative ripple removed from the rate, cps per pixel.
     """
-    expected = (rate + observation.sky_rate) * observation.exposure
+    expected = (rate + observation.background_rate) * observation.exposure
     return Exposure(
         counts=poisson_counts(expected, seed),
         expected=expected,

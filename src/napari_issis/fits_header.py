@@ -44,7 +44,11 @@ def observation_header(exposure: Exposure) -> fits.Header:
     header["CPSFLUX"] = (observation.cps_per_flux, "[ct/s] for 1 erg/s/cm2/A, with filters")
     header["SKYRATE"] = (observation.sky_rate, "[ct/s/pixel] sky, with filters")
     header["SKYMODEL"] = (sky_description(observation), "how the sky was chosen")
-    header["SKYCOUNT"] = (exposure.background, "[ct/pixel] expected sky in the exposure")
+    header["DARKRATE"] = (observation.dark, "[ct/s/pixel] of the detector itself")
+    header["SKYCOUNT"] = (
+        observation.sky_rate * observation.exposure,
+        "[ct/pixel] expected sky in the exposure",
+    )
     header["PIXSCALE"] = (observation.pixel_scale, "[arcsec] size of a pixel")
     header["PSFTYPE"] = (type(psf).__name__, "kind of point spread function")
     header["PSFASSUM"] = (observation.psf_assumed, "T: the PSF is assumed, not measured")

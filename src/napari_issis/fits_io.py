@@ -172,6 +172,7 @@ def _record(exposure: Exposure) -> Table:
         "EXPOSURE": observation.exposure,
         "NY": observation.shape[0],
         "NX": observation.shape[1],
+        "DARK": observation.dark,
         "BACKGROUND": np.nan if observation.background is None else observation.background,
         "RA": np.nan if pointing is None else float(pointing.ra.deg),
         "DEC": np.nan if pointing is None else float(pointing.dec.deg),
@@ -203,6 +204,7 @@ def _observation(row: dict[str, Any], hdus: fits.HDUList) -> Observation:
         pointing=pointing,
         roll=float(row["ROLL"]),
         sky=stored_sky(row),
+        dark=float(row.get("DARK", 0.0)),
     )
 
 

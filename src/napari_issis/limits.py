@@ -26,7 +26,7 @@ class CountRateWarning(UserWarning):
 
 def count_rate_warnings(
     rate: NDArray[np.float64],
-    sky_rate: float,
+    background_rate: float,
     *,
     sources: Table | None = None,
     observation: Observation | None = None,
@@ -37,8 +37,8 @@ def count_rate_warnings(
     ----------
     rate : ndarray, shape (ny, nx)
         Count rate of the sources, cps per pixel, filters included.
-    sky_rate : float
-        Sky, cps per pixel, filters included.
+    background_rate : float
+        Sky and dark rate, cps per pixel, filters included.
     sources : astropy.table.QTable, optional
         The source table. With it and ``observation`` the sources that break the local limit
         are named.
@@ -53,13 +53,13 @@ def count_rate_warnings(
     if rate.size == 0:
         return []
     messages = []
-    total = float(rate.sum() + sky_rate * rate.size)
+    total = float(rate.sum() + background_rate * rate.size)
     if total > LIMITS.total:
         messages.append(
             f"The frame receives {total:.3g} cps; a detector such as HST's SBC is linear up to "
             f"{LIMITS.total:.0e} cps."
         )
-    local = rate + sky_rate
+    local = rate + background_rate
     peak = float(local.max())
     if peak > LIMITS.local:
         y, x = np.unravel_index(int(local.argmax()), local.shape)

@@ -52,6 +52,9 @@ class Observation:
     sky : SkyModel
         The sky by components: `napari_issis.sky.CIS`, which holds the paper's constants, or a
         `napari_issis.sky.Sky`.
+    dark : float
+        Counts of the detector itself, cps per pixel, which no filter reduces. None is
+        published for ISSIS, and the paper has none.
 
     Raises
     ------
@@ -74,6 +77,7 @@ class Observation:
     roll: float = 0.0
     instrument: str = "ISSIS"
     sky: SkyModel = CIS
+    dark: float = 0.0
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -108,6 +112,7 @@ class Observation:
                 "background",
                 _number("background", self.background, "cps per pixel", positive=False),
             )
+        set_(self, "dark", _number("dark", self.dark, "cps per pixel", positive=False))
         if not isinstance(self.sky, SkyModel):
             raise ValueError(f"sky is {self.sky!r}; give a Sky, or one of SKIES by its key.")
         try:
@@ -194,6 +199,11 @@ class Observation:
         return rate * self.neutral_transmittance
 
     @property
+    def background_rate(self) -> float:
+        """Sky and dark rate together, cps per pixel."""
+        return self.sky_rate + self.dark
+
+    @property
     def sky_components(self) -> Mapping[str, float]:
         """Sky background in cps per pixel, filters included, by the component's name."""
         if self.background is not None:
@@ -232,6 +242,7 @@ class Observation:
             self.psf,
             self.background,
             self.sky if self.background is None else None,
+            self.dark,
             position,
             self.roll,
             self.instrument,
