@@ -16,6 +16,7 @@ from astropy.table import QTable
 
 from . import __version__
 from .exposure import Exposure, simulate
+from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .fits_header import psf_description
 from .fits_io import SUFFIXES as FITS_SUFFIXES
 from .instrument import CHANNELS, FILTERS
@@ -24,6 +25,7 @@ from .png import SCALES, write_png
 from .png import SUFFIXES as PNG_SUFFIXES
 from .safe_write import check_target
 from .scenes import SCENES, example_scene, load_scene
+from .sky import SKIES
 
 PROGRAM = "napari-issis"
 SCENE_HELP = "a built-in scene or a file: a source table (ECSV, FITS, CSV) or a saved exposure"
@@ -91,10 +93,12 @@ def _simulate(words: list[str]) -> None:
     parser.add_argument(
         "--filters",
         nargs=2,
-        choices=FILTERS,
+        choices=FILTER_NAMES,
         metavar=("WHEEL1", "WHEEL2"),
-        help=f"filter in each wheel ({', '.join(FILTERS)}); default: the scene's, or open open",
+        help=f"filter in each wheel: {', '.join(FILTERS)}, or illustrative "
+        f"{', '.join(ILLUSTRATIVE_FILTERS)}; default: the scene's, or open open",
     )
+    parser.add_argument("--sky", choices=SKIES, help="default: the scene's, or CIS")
     parser.add_argument(
         "--exposure", type=float, metavar="SECONDS", help="default: the scene's, or 100"
     )
@@ -120,6 +124,8 @@ def _simulate(words: list[str]) -> None:
     for name in ("channel", "filters", "exposure"):
         if getattr(options, name) is not None:
             changes[name] = getattr(options, name)
+    if options.sky is not None:
+        changes["sky"] = SKIES[options.sky]
     if options.frame is not None:
         frame = options.frame
         changes["shape"] = (frame[0], frame[0]) if len(frame) == 1 else tuple(frame)
