@@ -36,6 +36,13 @@ def test_rate_of_a_flat_spectrum():
     assert observation.cps_per_flux == pytest.approx(1.14e17 * expected, rel=1e-10)
 
 
+def test_a_given_background_passes_as_a_flat_spectrum():
+    """Catches a background that no curve reduces."""
+    observation = ni.Observation(filters=("NF1", CURVE), background=0.2)
+    expected = integral(lambda w: curve(w) * w) / (0.5 * (3200**2 - 1850**2))
+    assert observation.sky_rate == pytest.approx(0.2 * 0.1 * expected, rel=1e-10, abs=0)
+
+
 def test_two_curves_multiply():
     """Catches the product of the two transmittances in place of that of the curves."""
     other = ni.Filter("step", [2299.0, 2300.0, 3500.0], [0.0, 1.0, 1.0])
