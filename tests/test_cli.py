@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from astropy.io import fits
 from PIL import Image
 
 from napari_issis import Exposure, Observation, Sky, simulate, source
 from napari_issis import cli as cli_module
-from napari_issis.catalogue import write_sources
+from napari_issis.catalogue import read_sources, write_sources
 from napari_issis.cli import main
+from napari_issis.rgba import read_rgba
 from napari_issis.scenes import example_scene
 
 FRAME = ["--frame", "40", "48"]
@@ -289,3 +291,64 @@ def test_module_run():
     assert result.returncode == 2
     assert result.stderr.startswith("napari-issis: error: there is no scene 'nonsense'")
     assert "Traceback" not in result.stderr
+
+
+SKY = "ra,dec,mag\n150.0,60.0,18\n150.001,60.0002,19\n"
+
+
+def test_a_catalogue_with_positions_on_the_sky(capsys):
+    """Catches a pointing, roll or frame that comes too late for the catalogue."""
+    Path("sky.csv").write_text(SKY)
+    arguments = ["--pointing", "10h00m00s +60d00m00s", "--roll", "30", *FRAME]
+    assert main(["simulate", "sky.csv", *arguments, "--output", "x.fits"]) == 0
+    out = capsys.readouterr().out
+    assert "ra, dec -> x, y (ICRS" in out
+    assert "taken as AB magnitudes" in out
+    exposure = Exposure.read("x.fits")
+    assert exposure.observation.roll == 30.0
+    observation = exposure.observation
+    assert exposure == simulate(read_sources("sky.csv", observation), observation)
+    assert exposure.sources["x"][0] == pytest.approx(23.5)
+    assert "give the frame's with --pointing" in refused(
+        capsys, "simulate", "sky.csv", "--output", "y.fits"
+    )
+    for pointing in ("here", "1 2 3 4", "10 95"):
+        message = refused(
+            capsys, "simulate", "sky.csv", "--pointing", pointing, "--output", "y.fits"
+        )
+        assert f"pointing is '{pointing}'" in message
+
+
+def test_a_catalogue_in_the_frame_of_a_scene():
+    """Catches the scene's own sources kept, or the default frame taken for the scene's."""
+    Path("sky.csv").write_text(SKY)
+    point = ["--pointing", "150 60", "--channel", "FUV", *FRAME]
+    main(["simulate", "blend", *point, "--output", "x.fits"])
+    main(["simulate", "x.fits", "--catalogue", "sky.csv", "--output", "y.fits"])
+    exposure = Exposure.read("y.fits")
+    assert exposure.observation == Exposure.read("x.fits").observation
+    assert len(exposure.sources) == 2
+
+
+def test_an_exposure_as_the_scene_is_rendered_the_same(star):
+    main(["simulate", star, *FRAME, "--seed", "3", "--output", "x.fits"])
+    main(["simulate", "x.fits", "--seed", "3", "--output", "y.fits"])
+    assert Exposure.read("x.fits") == Exposure.read("y.fits")
+
+
+def test_further_files(star, capsys):
+    """Catches an option that is parsed and then forgotten."""
+    files = ["--rgba", "r.png", "--model", "m.png", "--png", "p.png"]
+    options = ["--zoom", "2", "--image", "snr", "--compress"]
+    main(["simulate", star, *FRAME, *files, *options, "--output", "x.fits"])
+    exposure = Exposure.read("x.fits")
+    np.testing.assert_array_equal(read_rgba("r.png"), exposure.counts)
+    for name in ("m.png", "p.png"):
+        with Image.open(name) as image:
+            assert image.size == (96, 80)
+    with fits.open("x.fits") as hdus:
+        np.testing.assert_array_equal(hdus[1].data, exposure.snr)
+    assert capsys.readouterr().out.count("wrote ") == 4
+    again = ["simulate", star, "--output", "y.fits", "--rgba", "r.png"]
+    assert "r.png exists already" in refused(capsys, *again)
+    assert not Path("y.fits").exists()

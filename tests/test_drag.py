@@ -6,6 +6,7 @@ from astropy.table import vstack
 
 import napari_issis as ni
 from napari_issis.render import moving
+from watching import watch_transforms
 
 SHAPE = (120, 100)
 OBSERVATION = ni.Observation(shape=SHAPE)
@@ -101,6 +102,18 @@ def test_a_move_renders_nothing_else(monkeypatch):
     drag.move(at(table, 33.3, 44.4))
     with pytest.raises(TypeError):
         drag.move(ni.source("exponential", 33.3, 44.4, 1e-15, r_half=2.0))
+
+
+def test_a_source_off_the_frame_is_not_transformed(monkeypatch):
+    """Catches a transform made for a window that misses the frame."""
+    table = scene("exponential")
+    drag = ni.Drag(table, OBSERVATION, [30])
+    transforms = watch_transforms(monkeypatch)
+    drag.move(at(table, -900.0, 44.4))
+    assert not transforms
+    assert np.array_equal(drag.rate, drag.rest)
+    drag.move(at(table, 33.3, 44.4))
+    assert transforms
 
 
 def test_what_is_negligible_is_left_out():

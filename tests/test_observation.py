@@ -12,7 +12,7 @@ from scipy.integrate import trapezoid
 import napari_issis as ni
 from napari_issis.instrument import CHANNELS
 from napari_issis.limits import count_rate_warnings
-from napari_issis.signal_to_noise import signal_to_noise
+from napari_issis.source_counts import signal_to_noise
 
 
 def test_numbers_of_the_paper():

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from napari_issis.png import write_png
+from napari_issis import source
+from napari_issis.plugin import layer_styles
+from napari_issis.png import ELLIPSE_COLORS, POINT_COLOR, write_png, write_source_png
 
 
 def picture(path):
@@ -110,3 +112,65 @@ def test_an_existing_picture_is_kept(tmp_path):
     assert path.read_text() == "mine"
     write_png(path, np.zeros((2, 2)), overwrite=True)
     assert picture(path)[0].shape == (2, 2)
+
+
+def test_magnified(tmp_path):
+    """Catches interpolation between pixels, and a picture magnified along one axis."""
+    image = np.arange(6).reshape(2, 3)
+    write_png(tmp_path / "x.png", image)
+    write_png(tmp_path / "z.png", image, zoom=3)
+    plain, large = picture(tmp_path / "x.png")[0], picture(tmp_path / "z.png")
+    np.testing.assert_array_equal(large[0], np.kron(plain, np.ones((3, 3), np.uint8)))
+    assert large[1]["Zoom"] == "3"
+    for zoom, message in [(0, "zoom is 0"), (1.5, "zoom is 1.5"), (65, "from 1 to 64")]:
+        with pytest.raises(ValueError, match=message):
+            write_png(tmp_path / "y.png", image, zoom=zoom)
+    with pytest.raises(ValueError, match="1024 pixels become 65536"):
+        write_png(tmp_path / "y.png", np.zeros((1, 1024)), zoom=64)
+
+
+@pytest.mark.parametrize("zoom", [1, 4])
+def test_half_light_ellipses(tmp_path, zoom):
+    """Catches an ellipse turned the wrong way, mirrored, upside down or of twice the size.
+
+    Every drawn pixel must lie within one pixel of the ellipse that the source table says:
+    major axis 40 pixels at 30 degrees from +y towards -x, minor axis 16.
+    """
+    galaxy = source("sersic", 70.0, 40.0, r_half=40.0, ellipticity=0.6, pa=30.0, n=2)
+    write_source_png(tmp_path / "x.png", galaxy, (100, 140), zoom=zoom)
+    pixels, text = picture(tmp_path / "x.png")
+    assert pixels.shape == (100 * zoom, 140 * zoom, 3)
+    assert text["Zoom"] == str(zoom)
+    drawn = pixels.any(axis=2)
+    assert np.unique(pixels[drawn], axis=0).tolist() == [[255, 0, 255]]
+    row, column = np.nonzero(drawn)
+    x = (column + 0.5) / zoom - 0.5 - 70.0
+    y = 100 - (row + 0.5) / zoom - 0.5 - 40.0
+    c, s = np.cos(np.radians(30)), np.sin(np.radians(30))
+    along, across = -s * x + c * y, c * x + s * y
+    for grow in (-1, 1):
+        radius = np.hypot(along / (40 + grow / zoom), across / (16 + grow / zoom))
+        assert (grow * (1 - radius) > 0).all()
+    assert along.max() > 39
+    assert across.max() > 15
+
+
+def test_stars_and_colours(tmp_path):
+    """Catches colours other than those of the layers in napari, and a star off its place."""
+    assert layer_styles.ELLIPSE_COLORS == ELLIPSE_COLORS
+    assert layer_styles.POINTS["border_color"] == POINT_COLOR
+    write_source_png(tmp_path / "x.png", source("point", 20.0, 30.0), (50, 60))
+    pixels = picture(tmp_path / "x.png")[0]
+    row, column = np.nonzero(pixels[..., 0])
+    assert not pixels[..., 1:].any()
+    assert (column.min() + column.max()) / 2 == 20
+    assert row.min() == 49 - 30 - 6
+    assert np.ptp(row) < 14
+
+
+def test_sources_outside_the_frame(tmp_path):
+    write_source_png(tmp_path / "x.png", source("uniform", 1e8, -1e8, r_half=1e7), (5, 6))
+    assert not picture(tmp_path / "x.png")[0].any()
+    write_source_png(tmp_path / "y.png", source("uniform", 1e7, 2, r_half=1e7), (5, 6))
+    with pytest.raises(ValueError, match="shape is"):
+        write_source_png(tmp_path / "z.png", source("point", 1, 2), (0, 6))

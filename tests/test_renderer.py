@@ -7,6 +7,10 @@ from scipy import integrate, special
 
 import napari_issis as ni
 from napari_issis.render import render
+from napari_issis.render.near import NEAR
+from napari_issis.render.optics import Optics
+from napari_issis.render.plan import make_plan
+from napari_issis.render.wrapping import wrapped_transfer
 from quadrature import brightness, disc_rate, pixel_share
 from quadrature import rate as quadrature_rate
 
@@ -317,3 +321,90 @@ def test_tighter_for_the_sky():
 def test_bad_tolerance(tolerance):
     with pytest.raises(ValueError, match="tolerance is"):
         ni.count_rate(ni.source("point", 1, 1), tolerance=tolerance)
+
+
+TELESCOPE = ni.TelescopePSF(1.7, 0.35, 2500.0, 0.05)
+
+
+@pytest.mark.parametrize("seen", [(511.0, 511.0), (150.0, 420.0)])
+def test_kernel_wraps_around_only_where_nobody_looks(seen):
+    """Against its Hankel transform, out to the largest distances seen.
+
+    Catches a window too steep or too early, an image folded on the wrong place, rings lost;
+    and a kernel that does not wrap.
+    """
+    optics = Optics(TELESCOPE, PIXEL)
+    farthest = float(np.hypot(*seen))
+    shape = tuple(int(d) + 1 for d in seen)
+    plan = make_plan(optics, shape, 1e-10, 1e-11, farthest, seen, 100000, 0)
+    assert plan.wraps
+    low, high = -5.0, np.array(shape) + 4.0
+    periods = [8 * int(np.ceil(plan.near_period(i, shape[i], low, high[i]) / 8)) for i in (0, 1)]
+    assert all(p < 2 * d + 100 for p, d in zip(periods, seen, strict=True))
+    transfer = wrapped_transfer(plan.filters, NEAR, *periods)
+
+    def wrapped(y, x):
+        phase_y, phase_x = (
+            np.cos(2 * np.pi * np.arange(n) * d / p) * np.where(np.arange(n) > 0, 2, 1) / p
+            for n, d, p in zip(transfer.shape, (y, x), periods, strict=True)
+        )
+        return phase_y @ transfer @ phase_x
+
+    node, weight = np.polynomial.legendre.leggauss(24)
+    edges = np.linspace(0, TELESCOPE.cutoff() * PIXEL, 1601)
+    half = 0.5 * np.diff(edges)[:, None]
+    k = (edges[:-1, None] + half * (node + 1)).ravel()
+    measure = (half * weight).ravel() * 2 * np.pi * k * TELESCOPE.otf(k / PIXEL)
+    measure *= 1 - plan.lowpass(k, 0)
+
+    def kernel(y, x):
+        return float(measure @ special.j0(2 * np.pi * k * np.hypot(y, x)))
+
+    allowed = np.exp(-plan.ring_digits) * optics.moment(0)
+    places = [(0, 0), (3, 1), (0, seen[1]), (seen[0], 0), seen, (0.4 * seen[0], 0.9 * seen[1])]
+    rings = [abs(kernel(y, x)) for y, x in places]
+    assert min(rings[2:4]) > 3 * allowed  # otherwise there is nothing to lose
+    # half a period away two half images meet
+    for y, x in [*places, (0, 0.5 * periods[1]), (0.5 * periods[0], 0)]:
+        assert abs(wrapped(y, x) - kernel(y, x)) <= allowed + 1e-16
+    assert abs(wrapped(0, periods[1] - 60.0)) > 30 * abs(kernel(0, periods[1] - 60.0))
+
+
+@pytest.mark.parametrize("shape", [(220, 330), (330, 220)])
+def test_rings_cross_the_frame(shape):
+    """Crowded stars at a corner, on a fine mesh: rings at the other end, pixel by pixel.
+
+    Catches rings dropped or cut before the frame's end, and those that wrap back into it.
+    """
+    count, x, y = 300, 1.3, shape[0] - 1.7
+    star = ni.source("point", x, y, 1e-14)
+    image = ni.count_rate(
+        vstack([star] * count), ni.Observation(shape=shape, psf=TELESCOPE), tolerance=1e-11
+    )
+    for row, column in [(0, shape[1] - 1), (shape[0] - 1, shape[1] - 1)]:
+        expected = count * 1e-14 * CPS * polar_rate(row - y, column - x)
+        assert abs(image[row, column] - expected) <= 1e-11 * image.max()
+
+
+def polar_rate(dy, dx):
+    """Share of a star's light in the pixel at a distance: the Fourier integral in polar form."""
+    far = np.hypot(dy, dx) + 1
+    node, weight = np.polynomial.legendre.leggauss(16)
+    cutoff = TELESCOPE.cutoff() * PIXEL
+    kinks = cutoff * np.array([0, 0.325, 0.35, 0.675, 1])
+    # the OTF has powers of 3/2 at its kinks: panels crowd there
+    near = np.geomspace(1e-6, 1, 16) * cutoff
+    panels = [np.linspace(0, cutoff, int(1.5 * cutoff * far) + 2)]
+    panels += [part for c in kinks for part in (c - near, [c], c + near)]
+    edges = np.unique(np.clip(np.concatenate(panels), 0, cutoff))
+    half = 0.5 * np.diff(edges)[:, None]
+    k = edges[:-1, None] + half * (node + 1)
+    measure = half * weight * k * TELESCOPE.otf(k / PIXEL)
+    angles = int(1.2 * 2 * np.pi * cutoff * far) + 64
+    theta = np.pi * (np.arange(angles) + 0.5) / angles
+    total = 0.0
+    for panel, share in zip(k, measure, strict=True):
+        kx, ky = np.outer(panel, np.cos(theta)), np.outer(panel, np.sin(theta))
+        light = np.sinc(kx) * np.sinc(ky) * np.cos(2 * np.pi * (kx * dx + ky * dy))
+        total += share @ light.sum(axis=1) * 2 * np.pi / angles
+    return total

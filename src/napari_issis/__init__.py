@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .cluster_profile import ClusterProfile
@@ -15,23 +16,44 @@ from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
+from .source_counts import signal_to_noise
 from .sources import source
 
 if TYPE_CHECKING:
     from astropy.table import Table
     from napari.viewer import Viewer
 
+    from .catalogue import Catalogue, read_catalogue, read_sources, write_sources
+    from .fits_image import FitsImage, read_image
     from .plugin.scene import Scene
+    from .png import write_png, write_source_png
+    from .rgba import read_rgba, write_rgba
 
 __version__ = "0.1.0"
 
+# Reading and writing of files, loaded when first used: astropy's formats take their time.
+_FILES = {
+    "Catalogue": "catalogue",
+    "read_catalogue": "catalogue",
+    "read_sources": "catalogue",
+    "write_sources": "catalogue",
+    "FitsImage": "fits_image",
+    "read_image": "fits_image",
+    "write_png": "png",
+    "write_source_png": "png",
+    "read_rgba": "rgba",
+    "write_rgba": "rgba",
+}
+
 __all__ = [
     "SKIES",
+    "Catalogue",
     "ClusterProfile",
     "CountRateWarning",
     "Drag",
     "Exposure",
     "Filter",
+    "FitsImage",
     "GaussianPSF",
     "ImagePSF",
     "MoffatPSF",
@@ -40,11 +62,26 @@ __all__ = [
     "TelescopePSF",
     "count_rate",
     "random_sources",
+    "read_catalogue",
+    "read_image",
+    "read_rgba",
+    "read_sources",
     "show",
+    "signal_to_noise",
     "simulate",
     "source",
     "star_cluster",
+    "write_png",
+    "write_rgba",
+    "write_source_png",
+    "write_sources",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _FILES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_FILES[name]}", __name__), name)
 
 
 def show(

@@ -12,23 +12,30 @@ from itertools import count
 from pathlib import Path
 from typing import NoReturn
 
+from astropy.coordinates import SkyCoord
 from astropy.table import QTable
 
 from . import __version__
+from .catalogue import read_catalogue
 from .exposure import Exposure, simulate
 from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .fits_header import psf_description
+from .fits_io import IMAGES
 from .fits_io import SUFFIXES as FITS_SUFFIXES
 from .instrument import CHANNELS, FILTERS
 from .observation import Observation
-from .png import SCALES, write_png
+from .png import SCALES, write_png, write_source_png
 from .png import SUFFIXES as PNG_SUFFIXES
+from .rgba import write_rgba
 from .safe_write import check_target
-from .scenes import SCENES, example_scene, load_scene
+from .scenes import SCENES, example_scene, load_scene, load_scene_with_notes
 from .sky import SKIES
 
 PROGRAM = "napari-issis"
-SCENE_HELP = "a built-in scene or a file: a source table (ECSV, FITS, CSV) or a saved exposure"
+SCENE_HELP = (
+    "a built-in scene or a file: a catalogue (ECSV, CSV, FITS, VOTable, DS9 regions) or a saved "
+    "exposure"
+)
 # Qt platforms that draw without an X or Wayland server.
 SCREENLESS_QT = ("offscreen", "minimal", "minimalegl", "vnc", "eglfs", "linuxfb")
 QT_BINDINGS = ("PyQt6", "PySide6", "PyQt5", "PySide2")
@@ -70,7 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except FileExistsError as error:
         _Parser().error(str(error).replace("overwrite=True", "--overwrite"))
     except (ValueError, OSError) as error:
-        _Parser().error(str(error))
+        asked = "give the observation a pointing"
+        _Parser().error(str(error).replace(asked, "give the frame's with --pointing"))
     except MemoryError:
         _Parser().error("there is not enough memory; choose a smaller frame.")
     except KeyboardInterrupt:
@@ -109,19 +117,43 @@ def _simulate(words: list[str]) -> None:
         metavar="N",
         help="pixels: one number for a square, or NY NX; default: the scene's, or 512",
     )
+    parser.add_argument(
+        "--pointing",
+        metavar='"RA DEC"',
+        help="position of the frame's centre on the sky (ICRS), for catalogues with ra and dec",
+    )
+    parser.add_argument(
+        "--roll", type=float, metavar="DEGREES", help="position angle of the frame's +y axis"
+    )
+    parser.add_argument(
+        "--catalogue",
+        metavar="FILE",
+        help="take the sources from this catalogue, and only the frame from SCENE",
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of the noise; default: 0")
     parser.add_argument(
         "--tolerance", type=float, help="largest error of a pixel's rate over the image's peak"
     )
     parser.add_argument("--compress", action="store_true", help="compress the counts, losslessly")
+    parser.add_argument(
+        "--image",
+        choices=IMAGES,
+        default="counts",
+        help="image that stands first in the FITS file; default: counts",
+    )
+    parser.add_argument("--rgba", metavar="X.png", help="counts as red + 256 green + 65536 blue")
+    parser.add_argument("--model", metavar="X.png", help="picture of the sources to write as well")
+    parser.add_argument("--zoom", type=int, default=1, help="magnification of both pictures")
     parser.add_argument("--overwrite", action="store_true", help="replace existing files")
     options = parser.parse_args(words)
 
-    check_target(options.output, FITS_SUFFIXES, overwrite=options.overwrite)
-    if options.png is not None:
-        check_target(options.png, PNG_SUFFIXES, overwrite=options.overwrite)
+    overwrite = options.overwrite
+    check_target(options.output, FITS_SUFFIXES, overwrite=overwrite)
+    for picture in (options.png, options.rgba, options.model):
+        if picture is not None:
+            check_target(picture, PNG_SUFFIXES, overwrite=overwrite)
     changes: dict[str, object] = {}
-    for name in ("channel", "filters", "exposure"):
+    for name in ("channel", "filters", "exposure", "roll"):
         if getattr(options, name) is not None:
             changes[name] = getattr(options, name)
     if options.sky is not None:
@@ -129,13 +161,48 @@ def _simulate(words: list[str]) -> None:
     if options.frame is not None:
         frame = options.frame
         changes["shape"] = (frame[0], frame[0]) if len(frame) == 1 else tuple(frame)
-    sources, observation = load_scene(options.scene)
-    exposure = _expose(sources, observation.replace(**changes), options.seed, options.tolerance)
-    exposure.write(options.output, overwrite=options.overwrite, compress=options.compress)
+    if options.pointing is not None:
+        changes["pointing"] = _pointing(options.pointing)
+    sources, observation, notes = load_scene_with_notes(options.scene, **changes)
+    if options.catalogue is not None:
+        catalogue = read_catalogue(options.catalogue, observation)
+        sources, notes = catalogue.sources, catalogue.notes
+    for note in notes:
+        print(note)
+    exposure = _expose(sources, observation, options.seed, options.tolerance)
+    exposure.write(
+        options.output, overwrite=overwrite, compress=options.compress, image=options.image
+    )
     print(f"wrote {options.output}")
+    counts, shape = exposure.counts, observation.shape
     if options.png is not None:
-        write_png(options.png, exposure.counts, scale=options.scale, overwrite=options.overwrite)
+        write_png(options.png, counts, scale=options.scale, zoom=options.zoom, overwrite=overwrite)
         print(f"wrote {options.png}")
+    if options.model is not None:
+        write_source_png(
+            options.model, exposure.sources, shape, zoom=options.zoom, overwrite=overwrite
+        )
+        print(f"wrote {options.model}")
+    if options.rgba is not None:
+        write_rgba(options.rgba, counts, overwrite=overwrite)
+        print(f"wrote {options.rgba}")
+
+
+def _pointing(text: str) -> SkyCoord:
+    """Parse a position such as ``22h40m30s +3d21m31s`` or, in degrees, ``340.1 3.36``."""
+    try:
+        ra, dec = (float(word) for word in text.split())
+    except ValueError:
+        try:
+            return SkyCoord(text, unit=("hourangle", "deg"))
+        except (ValueError, TypeError):
+            raise ValueError(
+                f'pointing is {text!r}; give two angles such as "22h40m30s +3d21m31s" or, in '
+                'degrees, "340.1 3.36".'
+            ) from None
+    if not -90 <= dec <= 90:
+        raise ValueError(f"pointing is {text!r}; its declination must be from -90 to 90 degrees.")
+    return SkyCoord(ra, dec, unit="deg")
 
 
 def _list_scenes(words: list[str]) -> None:

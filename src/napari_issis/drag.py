@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from .observation import Observation
 from .render import arrays_and_rates, count_rate, peaks
-from .render.moving import MovingSource, can_move
+from .render.moving import MovingSource, moving_source
 from .render.optics import Optics
+from .render.windows import Window
 from .sources import SourceArrays
 
 Array = NDArray[np.float64]
-Window = tuple[slice, slice]
 
 # sources moved at once, above which they are rendered together
 MOST_SOURCES = 24
@@ -120,8 +120,9 @@ class Drag:
             if key in self._kept:
                 kept[key] = self._kept[key]
             elif key not in kept:
-                fits = can_move(self._optics, one, rates[i], allowed, self.observation.shape)
-                kept[key] = MovingSource(self._optics, one, rates[i], allowed) if fits else None
+                kept[key] = moving_source(
+                    self._optics, one, rates[i], allowed, self.observation.shape
+                )
             mover = kept[key]
             if mover is None:
                 self._kept = {}
@@ -129,23 +130,15 @@ class Drag:
                     self.rate[window] = self.rest[window]
                 self._render(moved)
                 return [_whole(self.observation.shape)]
-            self._add(*mover.place(float(one.y[0]), float(one.x[0])))
+            drawn = mover.add(self.rate, float(one.y[0]), float(one.x[0]))
+            if drawn is not None:
+                self._windows.append(drawn)
         self._kept = kept
         return windows + self._windows
 
     def _render(self, moved: Table) -> None:
         self.rate += count_rate(moved, self.observation, tolerance=self.tolerance)
         self._windows = [_whole(self.observation.shape)]
-
-    def _add(self, row: int, column: int, image: Array) -> None:
-        ny, nx = self.observation.shape
-        top, left = max(row, 0), max(column, 0)
-        bottom, right = min(row + image.shape[0], ny), min(column + image.shape[1], nx)
-        if top >= bottom or left >= right:
-            return
-        window = (slice(top, bottom), slice(left, right))
-        self.rate[window] += image[top - row : bottom - row, left - column : right - column]
-        self._windows.append(window)
 
 
 def _shape_of(one: SourceArrays) -> tuple[object, ...]:

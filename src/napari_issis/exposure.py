@@ -60,11 +60,19 @@ class Exposure:
             where=counts > 0,
         )
 
-    def write(self, path: str | Path, *, overwrite: bool = False, compress: bool = False) -> None:
+    def write(
+        self,
+        path: str | Path,
+        *,
+        overwrite: bool = False,
+        compress: bool = False,
+        image: str = "counts",
+        whole: bool = True,
+    ) -> None:
         """Write the exposure to a FITS file; see `napari_issis.fits_io.write_exposure`."""
         from .fits_io import write_exposure
 
-        write_exposure(self, path, overwrite=overwrite, compress=compress)
+        write_exposure(self, path, overwrite=overwrite, compress=compress, image=image, whole=whole)
 
     @classmethod
     def read(cls, path: str | Path) -> Exposure:

@@ -2,8 +2,9 @@
 
 A file holds, in this order,
 
-* the counts as integers in the primary HDU, or compressed without loss in the extension
-  ``COUNTS`` behind an empty primary HDU;
+* an image in the primary HDU, or compressed without loss in the first extension behind an
+  empty primary HDU: the counts as integers, unless another image is asked for;
+* ``COUNTS``, where the image is another one;
 * ``EXPECTED``, the expected counts as 64-bit floats;
 * ``SOURCES``, the source table;
 * ``OBSERVATION``, one row with the exact values of the observation, of which the header's
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 from astropy.coordinates import SkyCoord
 from astropy.io import fits
-from astropy.table import Table
+from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .exposure import Exposure
@@ -36,6 +37,13 @@ from .sources import check_sources
 # Raised when a file of the new layout can no longer be read by the old program.
 LAYOUT = 1
 SUFFIXES = (".fits", ".fit", ".fts")
+# Units of the images that can stand first, and what they are.
+IMAGES = {
+    "counts": ("ct", "detected counts per pixel"),
+    "rate": ("ct/s", "detected counts per pixel and second"),
+    "expected": ("ct", "expected counts per pixel, sources and sky"),
+    "snr": ("", "signal-to-noise ratio per pixel, (C - B) / sqrt(C)"),
+}
 
 
 def write_exposure(
@@ -44,6 +52,8 @@ def write_exposure(
     *,
     overwrite: bool = False,
     compress: bool = False,
+    image: str = "counts",
+    whole: bool = True,
 ) -> None:
     """Write an exposure to a FITS file.
 
@@ -57,40 +67,114 @@ def write_exposure(
         Whether an existing file may be replaced. It is replaced as a whole once the new one
         is complete.
     compress : bool
-        Compress the counts without loss, tile by tile.
+        Compress the images without loss, tile by tile.
+    image : {"counts", "rate", "expected", "snr"}
+        The image that other programs see first: detected counts (integers), counts per
+        second, expected counts, or the signal-to-noise ratio per pixel (64-bit floats).
+    whole : bool
+        Whether all that `read_exposure` needs goes into the file, or the image alone.
 
     Raises
     ------
     ValueError
-        If the name does not end as above, or a column, the PSF or the sky cannot be stored.
+        If the name does not end as above, the image is not one of these, or a column, the
+        PSF or the sky cannot be stored.
     OSError
         If the file cannot be written; `FileExistsError` if it exists.
     """
-    cards = observation_header(exposure)
+    if image not in IMAGES:
+        raise ValueError(f"image is {image!r}; known: {', '.join(IMAGES)}.")
     wcs = wcs_header(exposure.observation)
-    image = fits.Header([("BUNIT", "ct", "counts per pixel")])
-    image.update(wcs)
-    counts = _smallest(exposure.counts)
+    cards = observation_header(exposure) + _unit(image) + wcs
+    first = _image_of(exposure, image)
     if compress:
-        algorithm = "RICE_1" if counts.dtype.itemsize == 4 else "GZIP_2"
-        hdus = [
-            fits.PrimaryHDU(header=cards),
-            fits.CompImageHDU(counts, cards + image, "COUNTS", compression_type=algorithm),
-        ]
+        hdus = [fits.PrimaryHDU(header=observation_header(exposure)), _packed(first, cards, image)]
     else:
-        hdus = [fits.PrimaryHDU(counts, cards + image)]
-    hdus += [
-        fits.ImageHDU(np.asarray(exposure.expected, dtype=np.float64), image, "EXPECTED"),
-        table_hdu(exposure.sources, "SOURCES"),
-        table_hdu(_record(exposure), "OBSERVATION"),
-    ]
-    psf = exposure.observation.psf
-    if isinstance(psf, ImagePSF):
-        scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
-        hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
-    hdus += filter_hdus(exposure.observation)
+        hdus = [fits.PrimaryHDU(first, cards)]
+    if whole:
+        for name in ("counts", "expected"):
+            # Uncompressed, the first image has no name to be found by; only counts need none.
+            if name == image and (compress or name == "counts"):
+                continue
+            further = _image_of(exposure, name)
+            if compress and name == "counts":
+                hdus.append(_packed(further, _unit(name) + wcs, name))
+            else:
+                hdus.append(fits.ImageHDU(further, _unit(name) + wcs, name.upper()))
+        hdus += scene_hdus(exposure.sources, exposure.observation, exposure.seed, exposure.clipped)
     with replacing(path, SUFFIXES, overwrite=overwrite) as file:
         fits.HDUList(hdus).writeto(file, output_verify="exception", checksum=True)
+
+
+def scene_hdus(
+    sources: Table, observation: Observation, seed: int, clipped: float = 0.0
+) -> list[Any]:
+    """Make the extensions from which a scene can be told: sources, observation, seed, PSF, filters.
+
+    Raises
+    ------
+    ValueError
+        If a column, the PSF or the sky cannot be stored; the message names it.
+    """
+    record = _record(observation, seed, clipped)
+    hdus = [table_hdu(sources, "SOURCES"), table_hdu(record, "OBSERVATION")]
+    if isinstance(observation.psf, ImagePSF):
+        psf = observation.psf
+        scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
+        hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
+    return hdus + filter_hdus(observation)
+
+
+def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
+    """Read what `scene_hdus` made: the checked sources, observation, seed and clipped counts.
+
+    Raises
+    ------
+    ValueError
+        If an extension is missing or broken.
+    """
+    names = [hdu.name for hdu in hdus]
+    missing = [name for name in ("SOURCES", "OBSERVATION") if name not in names]
+    if missing:
+        raise ValueError(
+            f"the file holds no napari-issis exposure: it has no extension {missing[0]}."
+        )
+    record = read_table(hdus["OBSERVATION"])
+    if len(record) != 1 or "LAYOUT" not in record.colnames:
+        raise ValueError("the extension OBSERVATION is not that of a napari-issis exposure.")
+    if record["LAYOUT"][0] > LAYOUT:
+        raise ValueError("the file was written by a newer napari-issis; update the program.")
+    row = {name: record[name][0] for name in record.colnames}
+    observation = _observation(row, hdus)
+    sources = read_table(hdus["SOURCES"])
+    check_sources(sources)
+    return sources, observation, int(row["SEED"]), float(row["CLIPPED"])
+
+
+def _image_of(exposure: Exposure, image: str) -> NDArray[Any]:
+    if image == "counts":
+        return _smallest(exposure.counts)
+    if image == "rate":
+        return np.asarray(exposure.counts / exposure.observation.exposure)
+    values = exposure.expected if image == "expected" else exposure.snr
+    return np.asarray(values, dtype=np.float64)
+
+
+def _unit(image: str) -> fits.Header:
+    unit, comment = IMAGES[image]
+    return fits.Header([("BUNIT", unit, comment)])
+
+
+def _packed(image: NDArray[Any], header: fits.Header, name: str) -> fits.CompImageHDU:
+    """Compress without loss: floats are not rounded, and so shrink less."""
+    rice = image.dtype == np.int32
+    return fits.CompImageHDU(
+        image,
+        header,
+        name.upper(),
+        compression_type="RICE_1" if rice else "GZIP_2",
+        quantize_level=0,
+    )
 
 
 def read_exposure(path: str | os.PathLike[str]) -> Exposure:
@@ -115,20 +199,11 @@ def read_exposure(path: str | os.PathLike[str]) -> Exposure:
     """
     with open_fits(path) as hdus:
         names = [hdu.name for hdu in hdus]
-        missing = [name for name in ("EXPECTED", "SOURCES", "OBSERVATION") if name not in names]
-        if missing:
+        if "EXPECTED" not in names:
             raise ValueError(
-                f"the file holds no napari-issis exposure: it has no extension {missing[0]}."
+                "the file holds no napari-issis exposure: it has no extension EXPECTED."
             )
-        record = read_table(hdus["OBSERVATION"])
-        if len(record) != 1 or "LAYOUT" not in record.colnames:
-            raise ValueError("the extension OBSERVATION is not that of a napari-issis exposure.")
-        if record["LAYOUT"][0] > LAYOUT:
-            raise ValueError("the file was written by a newer napari-issis; update the program.")
-        row = {name: record[name][0] for name in record.colnames}
-        observation = _observation(row, hdus)
-        sources = read_table(hdus["SOURCES"])
-        check_sources(sources)
+        sources, observation, seed, clipped = read_scene(hdus)
         counts = _image(hdus["COUNTS" if "COUNTS" in names else 0], observation.shape, "iu")
         expected = _image(hdus["EXPECTED"], observation.shape, "f")
         return Exposure(
@@ -136,8 +211,8 @@ def read_exposure(path: str | os.PathLike[str]) -> Exposure:
             expected=expected.astype(np.float64),
             sources=sources,
             observation=observation,
-            seed=int(row["SEED"]),
-            clipped=float(row["CLIPPED"]),
+            seed=seed,
+            clipped=clipped,
         )
 
 
@@ -158,9 +233,8 @@ def _image(hdu: Any, shape: tuple[int, int], dtype_kinds: str) -> NDArray[Any]:
     return data
 
 
-def _record(exposure: Exposure) -> Table:
+def _record(observation: Observation, seed: int, clipped: float) -> Table:
     """One row with every value that the observation is made of; NaN where there is none."""
-    observation = exposure.observation
     pointing = observation.pointing
     psf = observation.effective_psf
     values: dict[str, Any] = {
@@ -178,8 +252,8 @@ def _record(exposure: Exposure) -> Table:
         "DEC": np.nan if pointing is None else float(pointing.dec.deg),
         "ROLL": observation.roll,
         # as text: a seed may exceed 64 bits
-        "SEED": str(exposure.seed),
-        "CLIPPED": float(exposure.clipped),
+        "SEED": str(seed),
+        "CLIPPED": float(clipped),
         "PSF_ASSUMED": observation.psf_assumed,
         "PSF_TYPE": type(psf).__name__,
         **_psf_values(psf),

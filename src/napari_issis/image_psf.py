@@ -86,14 +86,15 @@ class ImagePSF:
         OSError
             If the file cannot be read.
         """
-        from astropy.io import fits
         from astropy.wcs import WCS
         from astropy.wcs.utils import proj_plane_pixel_scales
 
-        with fits.open(path, memmap=False) as hdus:
+        from .fits_table import open_fits
+
+        with open_fits(path) as hdus:
             image = next((hdu for hdu in hdus if hdu.is_image and hdu.data is not None), None)
             if image is None or image.data.ndim != 2:
-                raise ValueError(f"{path} holds no two-dimensional image.")
+                raise ValueError("the file holds no two-dimensional image.")
             header = image.header
             data = np.asarray(image.data, dtype=np.float64)
         if pixel_scale is None:

@@ -1,20 +1,37 @@
-"""Images as PNG files, at the image's own pixels and with row 0 at the bottom."""
+"""Images and source models as PNG files, with row 0 at the bottom."""
 
 from __future__ import annotations
 
 import os
 
 import numpy as np
+from astropy.table import Table
 from astropy.visualization import BaseStretch, LinearStretch, LogStretch, SqrtStretch
 from numpy.typing import ArrayLike, NDArray
-from PIL import Image
+from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
+from .observation import Observation
 from .safe_write import replacing
+from .sources import check_sources
 
 SUFFIXES = (".png",)
 SCALES = ("linear", "log", "sqrt")
 COLORMAPS = ("gray", "gray_r", "heat")
+LONGEST_SIDE = 32768
+# Colours after Shalyapin & Goicoechea (2014); the same as those of the layers in napari.
+POINT_COLOR = "red"
+ELLIPSE_COLORS = {
+    "uniform": "cyan",
+    "gaussian": "lightgreen",
+    "exponential": "yellow",
+    "devaucouleurs": "orange",
+    "sersic": "magenta",
+}
+# The outline of a star with five points, one of them up, and its radius in pixels of the file.
+STAR_RADIUS = 6.0
+_TURN = np.arange(10) * np.pi / 5
+STAR = (np.where(np.arange(10) % 2, 0.4, 1.0) * [-np.sin(_TURN), np.cos(_TURN)]).T
 
 
 def write_png(
@@ -23,10 +40,12 @@ def write_png(
     *,
     scale: str = "linear",
     limits: tuple[float, float] | None = None,
-    colormap: str = "gray",
+    colormap: str | NDArray[np.uint8] = "gray",
+    zoom: int = 1,
+    words: dict[str, str] | None = None,
     overwrite: bool = False,
 ) -> None:
-    """Write an image to a PNG file, one image pixel a PNG pixel.
+    """Write an image to a PNG file, one image pixel a PNG pixel unless magnified.
 
     Parameters
     ----------
@@ -39,40 +58,137 @@ def write_png(
         log(1000 v + 1) / log(1001) (as in SAOImage DS9) or sqrt(v).
     limits : (float, float), optional
         Values drawn darkest and brightest; by default the image's finite extremes.
-    colormap : {"gray", "gray_r", "heat"}
-        Black to white, white to black, or black over red and yellow to white.
+    colormap : {"gray", "gray_r", "heat"} or ndarray of uint8, shape (256, 3)
+        Black to white, white to black, or black over red and yellow to white; or colours from
+        dark to bright.
+    zoom : int
+        Side of the square that each image pixel becomes, 1 to 64.
+    words : dict of str, optional
+        PNG text beside, or in place of, that below.
     overwrite : bool
         Whether an existing file may be replaced.
 
     Raises
     ------
     ValueError
-        If the name, image, scale, limits or colormap is not as above.
+        If the name, image, scale, limits, colormap or zoom is not as above.
     OSError
         If the file cannot be written; `FileExistsError` if it exists.
 
     Notes
     -----
-    Scale, limits and colormap stand in the file as PNG text.
+    Scale, limits, colormap and zoom stand in the file as PNG text.
     """
     values = np.asarray(image, dtype=np.float64)
     if values.ndim != 2 or values.size == 0:
         raise ValueError(f"a PNG shows an image of two dimensions; this one's are {values.shape}.")
     if scale not in SCALES:
         raise ValueError(f"scale is {scale!r}; known: {', '.join(SCALES)}.")
-    if colormap not in COLORMAPS:
+    if isinstance(colormap, str) and colormap not in COLORMAPS:
         raise ValueError(f"colormap is {colormap!r}; known: {', '.join(COLORMAPS)}.")
+    _check_zoom(zoom, values.shape)
     low, high = _limits(values, limits)
     brightness = np.rint(255 * _stretch(scale)(_normalised(values, low, high))).astype(np.uint8)
-    picture = Image.fromarray(_colours(colormap)[np.flipud(brightness)])
+    magnified = np.flipud(brightness).repeat(zoom, axis=0).repeat(zoom, axis=1)
+    colours = _colours(colormap) if isinstance(colormap, str) else colormap
+    picture = Image.fromarray(colours[magnified])
+    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
+    if isinstance(colormap, str):
+        text["Colormap"] = colormap
+    _save(picture, path, text | (words or {}), overwrite=overwrite)
+
+
+def write_source_png(
+    path: str | os.PathLike[str],
+    sources: Table,
+    shape: tuple[int, int],
+    *,
+    zoom: int = 1,
+    overwrite: bool = False,
+) -> None:
+    """Draw a source model to a PNG file: stars, and ellipses that hold half of the light.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; its name ends in ``.png``.
+    sources : astropy.table.QTable
+        A source table.
+    shape : (int, int)
+        Frame ``(ny, nx)`` in pixels.
+    zoom : int
+        Side of the square that each pixel of the frame becomes, 1 to 64.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    ValueError
+        If the name, the table, the shape or the zoom is not as above.
+    OSError
+        If the file cannot be written; `FileExistsError` if it exists.
+
+    Notes
+    -----
+    The lines are one pixel of the file wide, on black, in the colours of `POINT_COLOR` and
+    `ELLIPSE_COLORS`.
+    """
+    arrays = check_sources(sources)
+    ny, nx = Observation(shape=shape).shape
+    _check_zoom(zoom, (ny, nx))
+    picture = Image.new("RGB", (nx * zoom, ny * zoom))
+    draw = ImageDraw.Draw(picture)
+    reach = np.maximum(arrays.r_half, STAR_RADIUS)
+    near = (np.abs(arrays.x - (nx - 1) / 2) <= nx / 2 + reach) & (
+        np.abs(arrays.y - (ny - 1) / 2) <= ny / 2 + reach
+    )
+    seen = arrays.take(near)
+    for i, kind in enumerate(seen.kind):
+        if kind == "point":
+            outline = np.append(STAR, STAR[:1], axis=0) * STAR_RADIUS / zoom
+        else:
+            outline = _ellipse(seen.r_half[i], seen.ellipticity[i], seen.pa[i], zoom)
+        x = (seen.x[i] + outline[:, 0] + 0.5) * zoom - 0.5
+        y = (ny - 0.5 - seen.y[i] - outline[:, 1]) * zoom - 0.5
+        points = np.clip(np.rint(np.stack([x, y], axis=1)), -1e6, 1e6)
+        draw.line([tuple(point) for point in points], fill=ELLIPSE_COLORS.get(kind, POINT_COLOR))
+    _save(picture, path, {"Zoom": str(zoom)}, overwrite=overwrite)
+
+
+def _ellipse(r_half: float, ellipticity: float, pa: float, zoom: int) -> NDArray[np.float64]:
+    """Return points of a half-light ellipse about its centre, (x, y) in pixels."""
+    angle = np.linspace(0, 2 * np.pi, int(np.clip(4 * r_half * zoom, 60, 4000)))
+    major, minor = r_half * np.cos(angle), r_half * (1 - ellipticity) * np.sin(angle)
+    c, s = np.cos(np.radians(pa)), np.sin(np.radians(pa))
+    return np.stack([-s * major + c * minor, c * major + s * minor], axis=1)
+
+
+def _save(
+    picture: Image.Image,
+    path: str | os.PathLike[str],
+    words: dict[str, str],
+    *,
+    overwrite: bool,
+) -> None:
     text = PngInfo()
-    text.add_text("Software", "napari-issis")
-    text.add_text("Scale", scale)
-    text.add_text("Limits", f"{low!r} {high!r}")
-    text.add_text("Colormap", colormap)
-    text.add_text("Orientation", "row 0 at the bottom")
+    for key, value in {
+        "Software": "napari-issis",
+        **words,
+        "Orientation": "row 0 at the bottom",
+    }.items():
+        text.add_text(key, value)
     with replacing(path, SUFFIXES, overwrite=overwrite) as file:
         picture.save(file, format="PNG", pnginfo=text)
+
+
+def _check_zoom(zoom: int, shape: tuple[int, ...]) -> None:
+    if isinstance(zoom, bool) or not hasattr(zoom, "__index__") or not 1 <= zoom <= 64:
+        raise ValueError(f"zoom is {zoom!r}; it must be a whole number from 1 to 64.")
+    if max(shape) * zoom > LONGEST_SIDE:
+        raise ValueError(
+            f"zoom is {zoom}: {max(shape)} pixels become {max(shape) * zoom}, more than "
+            f"{LONGEST_SIDE}; choose a smaller one."
+        )
 
 
 def _limits(values: NDArray[np.float64], limits: tuple[float, float] | None) -> tuple[float, float]:

@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from astropy.coordinates import SkyCoord
 from astropy.table import QTable, vstack
 
-from .catalogue import SUFFIXES, read_sources
+from .catalogue import PACKED_FITS, READABLE, read_catalogue
 from .fits_io import SUFFIXES as FITS_SUFFIXES
 from .fits_io import read_exposure
 from .fits_table import open_fits
@@ -150,19 +151,32 @@ def example_scene(name: str) -> ExampleScene:
     return SCENES[name]()
 
 
-def load_scene(name_or_path: str | os.PathLike[str]) -> tuple[QTable, Observation]:
+def load_scene(name_or_path: str | os.PathLike[str], **changes: Any) -> tuple[QTable, Observation]:
+    """Load a built-in scene or a file; see `load_scene_with_notes`."""
+    return load_scene_with_notes(name_or_path, **changes)[:2]
+
+
+def load_scene_with_notes(
+    name_or_path: str | os.PathLike[str], **changes: Any
+) -> tuple[QTable, Observation, tuple[str, ...]]:
     """Load a built-in scene or a file.
 
     Parameters
     ----------
     name_or_path : str or path-like
-        The name of a built-in scene, a source table (ECSV, FITS, CSV), or a saved exposure.
+        The name of a built-in scene, a catalogue in any format of
+        `napari_issis.catalogue.read_catalogue`, or a saved exposure.
+    **changes
+        What to change in the scene's observation, such as ``exposure=100``. Positions on the
+        sky are put into the changed frame.
 
     Returns
     -------
     sources : astropy.table.QTable
     observation : Observation
-        The saved exposure's, the built-in scene's, or the default one for a source table.
+        The saved exposure's, the built-in scene's, or the default one for a catalogue.
+    notes : tuple of str
+        What the columns of a catalogue were taken for.
 
     Raises
     ------
@@ -174,16 +188,18 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> tuple[QTable, Observatio
     name = str(name_or_path)
     if name in SCENES:
         scene = example_scene(name)
-        return scene.sources, scene.observation
-    if Path(name).suffix.lower() not in SUFFIXES and not Path(name).exists():
+        return scene.sources, scene.observation.replace(**changes), ()
+    if not name.lower().endswith(READABLE) and not Path(name).exists():
         raise ValueError(
             f"there is no scene {name!r}; known: {', '.join(SCENES)}; "
-            f"or give a source table ({', '.join(SUFFIXES)})."
+            f"or give a source table ({', '.join(READABLE)})."
         )
-    if Path(name).suffix.lower() in FITS_SUFFIXES:
+    if name.lower().endswith((*FITS_SUFFIXES, *PACKED_FITS)):
         with open_fits(name) as hdus:
             is_exposure = "OBSERVATION" in hdus
         if is_exposure:
             exposure = read_exposure(name)
-            return exposure.sources, exposure.observation
-    return read_sources(name), Observation()
+            return exposure.sources, exposure.observation.replace(**changes), ()
+    observation = Observation(**changes)
+    catalogue = read_catalogue(name, observation)
+    return catalogue.sources, observation, catalogue.notes

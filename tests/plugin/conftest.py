@@ -20,6 +20,7 @@ from napari.utils.interactions import (
 from qtpy.QtWidgets import QApplication
 from small_scene import SMALL, few_sources
 
+from napari_issis import autosave
 from napari_issis.plugin.scene import Scene, open_scene
 
 
@@ -52,6 +53,14 @@ def _without_gl():
                 module.get_gl_extensions = lambda: ""
             if hasattr(module, "get_max_texture_sizes"):
                 module.get_max_texture_sizes = lambda: (4096, 2048)
+
+
+@pytest.fixture(autouse=True)
+def _own_autosave_folder(tmp_path, monkeypatch):
+    """Keep the tests' scenes apart from the user's."""
+    folder = tmp_path / "autosave"
+    folder.mkdir()
+    monkeypatch.setattr(autosave, "autosave_folder", lambda: folder)
 
 
 @pytest.fixture
@@ -120,7 +129,8 @@ class Mouse:
             each.scale_factor = 0.036 / 4
         run(self.viewer, event)
         layer = self.viewer.layers.selection.active
-        run(layer, event)
+        if layer is not None:
+            run(layer, event)
 
 
 @pytest.fixture

@@ -164,7 +164,7 @@ def test_labels_of_the_colour_bar_are_counts(scene, form, scale):
 def test_magnitudes_beside_the_logarithm(scene, form):
     """Catches a forgotten exposure time, pixel area or sky: 2.5 mag for a factor of ten."""
     form.scale.value = "log"
-    assert form.bar._magnitudes
+    assert form.bar.has_magnitudes
     scene.counts.set_limits((1.0, 1000.0))
     ticks = dict(form.bar.magnitude_ticks())
     # by hand: counts to flux per square arcsec, flux to AB at the pivot wavelength

@@ -17,7 +17,7 @@ from small_scene import SMALL, few_sources
 
 from napari_issis import Exposure, random_sources, simulate, source
 from napari_issis.exposure import same_table
-from napari_issis.plugin import samples
+from napari_issis.plugin import exposure_layers, samples
 from napari_issis.plugin.dock import SimulatorWidget
 from napari_issis.plugin.instrument_form import InstrumentForm
 from napari_issis.plugin.scene import open_scene, scene_of
@@ -380,7 +380,7 @@ def test_open_sample_gives_a_live_scene(make_napari_viewer, npe2pm, qtbot, monke
     }
     monkeypatch.setattr(samples, "example_scene", small.get)
     asked = []
-    monkeypatch.setattr(samples, "_may_replace", lambda count: asked.append(count) or False)
+    monkeypatch.setattr(exposure_layers, "may_replace", lambda count: asked.append(count) or False)
     with npe2pm.tmp_plugin(manifest=PluginManifest.from_file(ROOT / "napari.yaml")):
         viewer.open_sample("napari-issis", "q2237")
         assert len(viewer.layers) == 3
@@ -393,7 +393,7 @@ def test_open_sample_gives_a_live_scene(make_napari_viewer, npe2pm, qtbot, monke
         qtbot.waitUntil(lambda: asked == [4], timeout=5000)
         assert len(viewer.layers) == 3
         assert len(scene.sources) == 4
-        monkeypatch.setattr(samples, "_may_replace", lambda count: True)
+        monkeypatch.setattr(exposure_layers, "may_replace", lambda count: True)
         viewer.open_sample("napari-issis", "blend")
         qtbot.waitUntil(lambda: len(viewer.layers) == 3, timeout=5000)
         scene.wait()

@@ -20,6 +20,7 @@ def test_every_command_is_declared_and_every_function_exists():
     used = [widget.command for widget in contributions.widgets]
     used += [sample.command for sample in contributions.sample_data]
     used += [writer.command for writer in contributions.writers]
+    used += [reader.command for reader in contributions.readers]
     used += [item.command for items in contributions.menus.values() for item in items]
     assert set(used) == declared
     manifest().validate_imports()

@@ -81,10 +81,12 @@ def test_moving_the_pointer_shows_the_tooltip(scene, over, qtbot):
 
 def test_the_status_line(scene):
     """Catches x and y exchanged, counts per second for counts, a wrong background in the SNR."""
+    scene.observation = SMALL.replace(background=0.5)
+    scene.wait()
     scene.viewer.cursor.position = (50.0 * 0.036, 61.0 * 0.036)
     scene.viewer.status = "what napari has to say"
     counts = scene.exposure.counts[50, 61]
-    background = 50 * scene.observation.sky_rate
+    background = 50 * 0.5
     snr = (counts - background) / np.sqrt(counts)
     assert scene.viewer.status == (
         f"x 61  y 50   E -0.77″  N +0.67″   C {counts}   {counts / 50:.4g} cps   SNR {snr:.2f}"

@@ -21,7 +21,9 @@ def assert_consistent(scene):
     """Picture, layers and table tell the same, and ids are unique."""
     scene.wait()
     fresh = simulate(scene.sources, scene.observation, seed=scene.seed)
-    assert np.array_equal(scene.counts.layer.data, fresh.counts)
+    assert scene.exposure == fresh
+    if scene.counts.layer is not None:
+        assert np.array_equal(scene.counts.layer.data, fresh.counts)
     ids = []
     for view in scene.editor.views:
         if view.layer is None:
@@ -376,3 +378,14 @@ def test_closing_in_the_middle_of_a_render(scene, qtbot):
     scene.viewer.layers.clear()
     qtbot.waitUntil(lambda: not scene._jobs.busy, timeout=5000)
     assert len(scene.viewer.layers) == 0
+
+
+def test_edges_stay_thin_when_zoomed(scene, qtbot):
+    """Catches ellipses as thick as the galaxies they mark; 1.5 pixels of the screen are meant."""
+    camera, layer = scene.viewer.scene.camera, scene.editor.ellipses.layer
+    whole = layer.edge_width[0]
+    camera.zoom = 8 * 1.5 / (whole * 0.036)
+    qtbot.waitUntil(lambda: np.allclose(layer.edge_width, whole / 8), timeout=2000)
+    assert same_table(scene.sources, few_sources())
+    camera.zoom = 0.1
+    qtbot.waitUntil(lambda: np.allclose(layer.edge_width, whole), timeout=2000)

@@ -101,7 +101,7 @@ def to_view_box(viewer: Any, layer: Any, position: Any) -> NDArray[np.float64] |
     """
     dims, camera = viewer.dims, viewer.scene.camera
     shown = [axis - (dims.ndim - 2) for axis in dims.displayed]
-    if sorted(shown) != [0, 1]:
+    if dims.ndisplay != 2 or sorted(shown) != [0, 1]:
         return None
     world = np.asarray(layer.data_to_world(position), dtype=np.float64)[shown]
     down, right = world - np.asarray(camera.center[-2:], dtype=np.float64)

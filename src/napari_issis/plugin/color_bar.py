@@ -14,7 +14,7 @@ from .brightness import counts_at, stretched
 from .scene import Scene
 
 BAR = 14  # height of the colours, pixels on the screen
-MARGIN = 14  # beside them, for half a label
+MARGIN = 10  # beside them, for half a label
 GAP = 6  # between two labels
 
 
@@ -34,12 +34,13 @@ class ColorBar(QWidget):  # type: ignore[misc]
         self.setToolTip("Counts per pixel; below, on the logarithmic scale, AB mag arcsec⁻²")
 
     @property
-    def _magnitudes(self) -> bool:
+    def has_magnitudes(self) -> bool:
+        """Whether surface brightnesses are shown below the counts."""
         return self.scene.counts.effective_scale == "log"
 
     def sizeHint(self) -> QSize:
         """Return the size: the bar and a line or two of labels."""
-        lines = 2 if self._magnitudes else 1
+        lines = 2 if self.has_magnitudes else 1
         return QSize(200, BAR + lines * (self.fontMetrics().height() + 3) + 2)
 
     def show_scale(self, event: Any = None) -> None:
@@ -96,7 +97,7 @@ class ColorBar(QWidget):  # type: ignore[misc]
         painter.setPen(self.palette().color(QPalette.ColorRole.WindowText))
         painter.drawRect(QRectF(MARGIN, 0, width, BAR))
         self._label(painter, BAR + 2, width, self.ticks())
-        if self._magnitudes:
+        if self.has_magnitudes:
             line = self.fontMetrics().height() + 3
             self._label(painter, BAR + 2 + line, width, self.magnitude_ticks())
 

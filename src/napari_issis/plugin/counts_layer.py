@@ -92,6 +92,11 @@ class CountsLayer:
         return "linear" if self._shows == "difference" else self._scale
 
     @property
+    def base_colormap(self) -> Colormap:
+        """The colours, from dark to bright, whatever the scale."""
+        return self._base
+
+    @property
     def background(self) -> float:
         """Expected sky counts per pixel of what is shown."""
         return 0.0 if self._picture is None else self._picture.exposure.background

@@ -6,6 +6,7 @@ from typing import Any
 
 from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
+from qtpy.QtWidgets import QLabel
 
 from .brightness import SCALES
 from .color_bar import ColorBar
@@ -50,7 +51,9 @@ class DisplayForm(Form):
         self.add("Image", self.shows)
         self.add("Brightness", self.scale)
         self.add("Limits (ct)", self.low, self.high, self.auto)
-        self.add_native(self.bar)
+        self.units = QLabel()
+        self.units.setToolTip(self.bar.toolTip())
+        self.add_native(self.units, self.bar)
         self.shows.changed.connect(self._set_shows)
         self.scale.changed.connect(self._set_scale)
         self.auto.changed.connect(self._choose_limits)
@@ -85,6 +88,7 @@ class DisplayForm(Form):
             if not field.native.hasFocus():
                 field.number = float(f"{value:.4g}")
         self.bar.show_scale()
+        self.units.setText("\nct/px\nAB mag/″²" if self.bar.has_magnitudes else "\nct/px")
 
     def _listen(self, layer: Any) -> None:
         if self._layer is layer:

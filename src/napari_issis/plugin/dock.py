@@ -20,9 +20,11 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from .crash_guard import CrashGuard
 from .display_form import DisplayForm
 from .instrument_form import InstrumentForm
 from .panels import LIST_NAME, toggle_panel
+from .png_menu import PngMenu
 from .scene import open_scene
 from .source_form import SourceForm
 from .source_list import SourceList
@@ -58,7 +60,10 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.redo = _tool("&Redo", self.scene.redo)
         self.list = _tool("Sources…", self.toggle_list)
         self.list.setToolTip("Show or hide the list of sources")
-        for button in (self.undo, self.redo, self.list):
+        self.png = QPushButton("PNG")
+        self.png.setToolTip("Save the final image, the source model or RGBA data as a picture")
+        self.png.setMenu(PngMenu(self.scene, self))
+        for button in (self.undo, self.redo, self.list, self.png):
             tools.addWidget(button)
         for keys, action in (
             (QKeySequence.StandardKey.Undo, self.scene.undo),
@@ -76,6 +81,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.pages.setTabToolTip(1, "Brightness, frames, zoom, traces")
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 4)
+        self.guard = CrashGuard(self.scene)
+        layout.addWidget(self.guard)
         layout.addWidget(self.pages)
         buttons = QHBoxLayout()
         buttons.setContentsMargins(4, 0, 4, 0)

@@ -67,9 +67,9 @@ class Form(QGroupBox):  # type: ignore[misc]
             self._rows.addRow(field)
         return field
 
-    def add_native(self, widget: QWidget) -> None:
-        """Add a row that is one Qt widget."""
-        self._rows.addRow(widget)
+    def add_native(self, label: QWidget, field: QWidget) -> None:
+        """Add a row of Qt widgets."""
+        self._rows.addRow(label, field)
 
     def add_text(self, tooltip: str) -> QLabel:
         """Add a row of text that wraps; return the label to write on."""

@@ -13,7 +13,7 @@ from astropy.wcs import WCS
 from ..exposure import Exposure
 from ..fits_header import wcs_header
 from ..observation import Observation
-from ..signal_to_noise import expected_counts, signal_to_noise
+from ..source_counts import expected_counts, signal_to_noise
 from ..sources import check_sources
 from .units import Units
 

@@ -33,6 +33,8 @@ _SCENES: WeakValueDictionary[int, Scene] = WeakValueDictionary()
 
 # A drag that rests for so long (ms) is shown as it will be when it ends.
 PAUSE = 200
+# When a zoom rests for so long (ms), the ellipses' edges are drawn as thin as before.
+ZOOM_PAUSE = 80
 # Row 0 at the bottom and x to the right, as astronomers expect.
 ORIENTATION = ("up", "right")
 
@@ -89,6 +91,11 @@ class Scene:
         self._timer = QTimer()
         self._timer.setSingleShot(True)
         self._timer.timeout.connect(self._refresh)
+        self._zoomed = QTimer()
+        self._zoomed.setSingleShot(True)
+        self._zoomed.setInterval(ZOOM_PAUSE)
+        self._zoomed.timeout.connect(self._follow_zoom)
+        viewer.scene.camera.events.zoom.connect(self._zoom_changed)
         self._pause = QTimer()
         self._pause.setSingleShot(True)
         self._pause.setInterval(PAUSE)
@@ -333,6 +340,13 @@ class Scene:
         with self.editor.quiet():
             for view in self.editor.views:
                 view.fit(self._observation.shape)
+
+    def _zoom_changed(self, event: Any = None) -> None:
+        self._zoomed.start()
+
+    def _follow_zoom(self) -> None:
+        with self.editor.quiet():
+            self.editor.ellipses.follow_zoom(self.viewer.scene.camera.zoom)
 
     @property
     def _alone(self) -> bool:

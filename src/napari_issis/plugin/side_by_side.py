@@ -62,11 +62,10 @@ class SideBySide:
         }
         self._frame = _empty_frame(self.scene.observation.shape)
         self._busy = True
-        selected, active = set(viewer.layers.selection), viewer.layers.selection.active
+        selected = set(viewer.layers.selection)
         viewer.layers.insert(self._place(), self._frame)
         viewer.layers.selection.clear()
         viewer.layers.selection.update(selected)
-        viewer.layers.selection.active = active
         self._busy = False
         self._arrange()
         grid.enabled = True

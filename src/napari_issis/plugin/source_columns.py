@@ -14,7 +14,7 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from ..observation import Observation
-from ..signal_to_noise import expected_counts, signal_to_noise
+from ..source_counts import expected_counts, signal_to_noise
 from ..sources import (
     DEFAULT_ELLIPTICITY,
     DEFAULT_FLUX,

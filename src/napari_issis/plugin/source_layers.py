@@ -11,6 +11,7 @@ from astropy.table import QTable
 from napari.layers import Points, Shapes
 from numpy.typing import NDArray
 
+from ..instrument import PIXEL_SCALE
 from . import layer_styles as styles
 from .layers import (
     FEATURES,
@@ -232,11 +233,22 @@ class EllipsesLayer(SourceLayer):
     """Extended sources as the ellipses that hold half of their light."""
 
     role = "ellipses"
-    _edge_width = 1.0
+    _widest = _edge_width = 1.0
 
     def fit(self, shape: tuple[int, int]) -> None:
         """Make the edges thick enough to be seen, and no thicker, when the frame is."""
-        self._edge_width = styles.edge_width(shape)
+        self._widest = styles.edge_width(shape)
+        self._set_width(self._widest)
+
+    def follow_zoom(self, zoom: float) -> None:
+        """Keep the edges as thin on the screen as they are in the whole frame.
+
+        ``zoom`` is in pixels of the screen for an arcsec.
+        """
+        self._set_width(min(self._widest, styles.EDGE / (zoom * PIXEL_SCALE)))
+
+    def _set_width(self, width: float) -> None:
+        self._edge_width = width
         if self.layer is not None:
             self.layer.edge_width = self._edge_width
             self.layer.current_edge_width = self._edge_width

@@ -32,8 +32,9 @@ from qtpy.QtWidgets import (
 )
 from superqt.utils import qthrottled
 
-from ..catalogue import SUFFIXES, read_sources, write_sources
+from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
 from ..sources import KINDS
+from .reader import tell_notes
 from .scene import open_scene
 from .source_columns import COLUMNS, from_text, to_text
 from .source_model import SourceModel
@@ -41,8 +42,9 @@ from .source_model import SourceModel
 # Milliseconds between two updates during a drag.
 REST = 100
 # Characters that the columns are wide enough for.
-WIDTHS = {"kind": 16, "flux": 18, "counts": 11}
+WIDTHS = {"kind": 20, "flux": 18, "counts": 11}
 TABLES = f"Source tables ({' '.join('*' + suffix for suffix in SUFFIXES)})"
+CATALOGUES = f"Catalogues ({' '.join('*' + suffix for suffix in READABLE)})"
 
 
 class SourceList(QWidget):  # type: ignore[misc]
@@ -83,8 +85,12 @@ class SourceList(QWidget):  # type: ignore[misc]
             ("&Copy", "Copy the selected rows as text (Ctrl+C)", self.copy),
             ("&Paste", "Add sources from text, as of a spreadsheet (Ctrl+V)", self.paste),
             ("&Delete", "Remove the selected sources (Del)", self.delete),
-            ("&Import…", "Add the sources of a file: ECSV, CSV, FITS", self.load),
-            ("&Export…", "Write the sources to a file: ECSV, CSV, FITS", self.save),
+            (
+                "&Import…",
+                "Add a catalogue: ECSV, CSV, FITS, VOTable, DS9",
+                self.load,
+            ),
+            ("&Export…", "Write the sources to a file: ECSV, CSV, FITS, VOTable", self.save),
         ):
             button = QPushButton(label)
             button.setToolTip(tooltip)
@@ -190,17 +196,17 @@ class SourceList(QWidget):  # type: ignore[misc]
 
     def load(self) -> None:
         """Ask for a file and add its sources; an error changes nothing."""
-        path, _ = QFileDialog.getOpenFileName(self, "Add sources of a file", "", TABLES)
+        path, _ = QFileDialog.getOpenFileName(self, "Add sources of a file", "", CATALOGUES)
         if not path:
             return
         try:
-            table = read_sources(path)
-            self.scene.add(table)
+            catalogue = read_catalogue(path, self.scene.observation)
+            self.scene.add(catalogue.sources)
         except (OSError, ValueError) as error:
             show_error(str(error))
             return
-        self._select_last(len(table))
-        show_info(f"{len(table)} source(s) added from {path}")
+        self._select_last(len(catalogue.sources))
+        tell_notes(path, len(catalogue.sources), catalogue.notes)
 
     def save(self) -> None:
         """Ask for a file and write the sources to it; an error is shown."""

@@ -68,12 +68,13 @@ class TraceWidget(QWidget):  # type: ignore[misc]
         """Title of the plot, in parts."""
         colors = self.plot.colors
         count, expected = trace.counts[trace.position], trace.expected[trace.position]
+        digits = ".0f" if expected >= 1000 else ".4g"
         place, across = ("Row y", "x") if self.along == "row" else ("Column x", "y")
         return [
             f"<b>{place} = {trace.index}</b>",
             f"{across} = {trace.position}",
             f'<span style="color:{colors.counts.name()}">C = {count}</span>',
-            f'<span style="color:{colors.expected.name()}">expected {expected:.4g}</span>',
+            f'<span style="color:{colors.expected.name()}">expected {expected:{digits}}</span>',
         ]
 
     def show_title(self, event: Any = None) -> None:

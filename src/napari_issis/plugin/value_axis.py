@@ -79,7 +79,7 @@ class ValueAxis:
         ticks: list[tuple[float, str]] = []
         for value in wanted:
             place = float((self._stretch(value) - self._low) / (self._high - self._low))
-            if linear or all(abs(place - other) >= 0.7 / max(most, 1) for other, _ in ticks):
+            if linear or all(abs(place - other) >= 0.9 / max(most, 1) for other, _ in ticks):
                 ticks.append((place, tick_text(value)))
         return sorted(ticks)
 

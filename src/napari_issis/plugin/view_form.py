@@ -64,7 +64,7 @@ class ViewForm(Form):
         for button in (self.fit, *self.factors.values()):
             button.native.setMinimumWidth(30)
             button.native.setStyleSheet("padding: 2px;")
-        self.add("about", self.centre)
+        self.add("About", self.centre)
         self.add("Show", self.scale_bar, self.compass, self.trace)
         for box in (self.scale_bar, self.compass, self.trace):
             text = box.native.fontMetrics().horizontalAdvance(box.text)

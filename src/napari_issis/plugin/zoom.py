@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .canvas_geometry import view_box
+from .canvas_geometry import to_view_box, view_box
 from .scene import Scene
 
 FACTORS = (1, 2, 4, 8)
@@ -47,7 +47,7 @@ class Zoom:
         512, along the side of the canvas in which they fit less well.
         """
         layer, viewer = self.scene.counts.layer, self.scene.viewer
-        if layer is None or viewer.dims.ndisplay != 2:
+        if layer is None or to_view_box(viewer, layer, (0.0, 0.0)) is None:
             return
         low, high = _frame(layer)
         centre = self._selected() if self.centre == "selected" else None

@@ -132,7 +132,8 @@ def _render(
         shape,
         allowed / brightest,
         _ring_accuracy(optics, sources, rate, allowed),
-        _farthest(sources, shape),
+        float(np.hypot(*_distances(sources, shape, near_by=True))),
+        _distances(sources, shape),
         int(is_point.sum()),
         int((~is_point).sum()),
         sharp_edge,
@@ -181,14 +182,20 @@ def _ring_accuracy(optics: Optics, sources: SourceArrays, rate: Array, allowed: 
     return float(allowed * optics.point_area / (strongest * 3 * (1 + np.sqrt(neighbours))))
 
 
-def _farthest(sources: SourceArrays, shape: tuple[int, int]) -> float:
-    """Largest distance in pixels between a source that is not far away and a pixel."""
-    y, x = (np.clip(p, -n, 2 * n) for p, n in zip((sources.y, sources.x), shape, strict=True))
+def _distances(
+    sources: SourceArrays, shape: tuple[int, int], *, near_by: bool = False
+) -> tuple[float, float]:
+    """Largest distances (y, x) in pixels between a source and a pixel.
+
+    ``near_by`` brings sources that are far away closer.
+    """
     half = np.sqrt(2) * np.minimum(sources.r_half, LARGEST_DISC)
     half[sources.kind == "point"] = 0.0
-    away_y = np.maximum(y + half, shape[0] - 1 - y + half)
-    away_x = np.maximum(x + half, shape[1] - 1 - x + half)
-    return float(np.hypot(away_y, away_x).max())
+    distances = []
+    for p, n in zip((sources.y, sources.x), shape, strict=True):
+        at = np.clip(p, -n, 2 * n) if near_by else p
+        distances.append(float((np.maximum(at, n - 1 - at) + half).max()))
+    return distances[0], distances[1]
 
 
 def peaks(optics: Optics, sources: SourceArrays, rate: Array) -> Array:

@@ -10,6 +10,7 @@ from scipy import special
 
 from ..psf import RadialPSF
 from ..sources import SourceArrays
+from .hankel import hankel_nodes
 from .optics import Optics
 from .profiles import sersic_value
 
@@ -64,12 +65,8 @@ def psf_envelope(optics: Optics) -> Array:
     """Largest brightness per pixel of a point source of unit rate beyond each of the RADII."""
     psf = optics.psf
     assert isinstance(psf, RadialPSF)
-    limit = optics.band_limit(1e-12)
-    x, w = np.polynomial.legendre.leggauss(16)
-    panels = int(limit * RADII[-1]) + 8
-    k = ((np.arange(panels)[:, None] + 0.5 * (x + 1)) * (limit / panels)).ravel()
+    k, measure = hankel_nodes(optics.band_limit(1e-12), RADII[-1])
     # the pixel as it acts along its own axis, averaged least
-    measure = np.pi * (limit / panels) * np.tile(w, panels) * k
     measure *= psf.otf(k / optics.pixel_scale) / np.sqrt(1 + (np.pi * k) ** 2)
     brightness = special.j0(2 * np.pi * np.outer(RADII, k)) @ measure
     return np.maximum.accumulate(np.abs(brightness)[::-1])[::-1]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Spectrum = NDArray[np.complex128]
 
 
-def fold_rows(upper: Spectrum, lower: Spectrum, period: int, out: Spectrum) -> None:
+def fold_rows(upper: Spectrum, lower: Spectrum, period: int) -> Spectrum:
     """Sum the aliases along the first axis.
 
     Parameters
@@ -17,35 +17,39 @@ def fold_rows(upper: Spectrum, lower: Spectrum, period: int, out: Spectrum) -> N
         Amplitudes at the frequencies 0 ... m and -m ... -1, in units of 1 / period.
     period : int
         Pixels.
-    out : ndarray, shape (period, n)
-        Where the sums go, in the order of `scipy.fft.fft`.
+
+    Returns
+    -------
+    ndarray, shape (period, n)
+        In the order of `scipy.fft.fft`.
     """
+    out = np.zeros((period, upper.shape[1]), dtype=np.complex128)
     first = min(period, upper.shape[0])
     out[:first] = upper[:first]
-    out[first:] = 0.0
     for start in range(period, upper.shape[0], period):
         part = upper[start : start + period]
         out[: part.shape[0]] += part
     for last in range(lower.shape[0], 0, -period):
         part = lower[max(last - period, 0) : last]
         out[period - part.shape[0] :] += part
+    return out
 
 
 def fold_half(spectrum: Spectrum, period: int) -> Spectrum:
-    """Sum the aliases in x of a real image's spectrum.
+    """Sum the aliases along the rows of a real image.
 
     Parameters
     ----------
     spectrum : ndarray, shape (ny, m + 1)
-        Amplitudes at kx = 0 ... m in units of 1 / period; those below zero are the conjugates
-        of those at -ky.
+        Amplitudes of each row at the frequencies 0 ... m in units of 1 / period; those below
+        zero are their conjugates.
     period : int
         Pixels.
 
     Returns
     -------
     ndarray, shape (ny, period // 2 + 1)
-        As `scipy.fft.irfft2` wants it.
+        As `scipy.fft.irfft` wants it.
     """
     modes, middle = spectrum.shape[1] - 1, period // 2
     result = np.zeros((spectrum.shape[0], middle + 1), dtype=np.complex128)
@@ -57,7 +61,5 @@ def fold_half(spectrum: Spectrum, period: int) -> Spectrum:
         end = (n + 1) * period
         low, high = max(end - middle, 1), min(end, modes)
         if low <= high:
-            part = spectrum[:, low : high + 1][:, ::-1]
-            result[0, end - high : end - low + 1] += part[0].conj()
-            result[1:, end - high : end - low + 1] += part[:0:-1].conj()
+            result[:, end - high : end - low + 1] += spectrum[:, low : high + 1][:, ::-1].conj()
     return result

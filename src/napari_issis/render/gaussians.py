@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 MOST_ELONGATED = 6.0
 # Gaussians that take the place of a source's narrowest
 NODES = 3
-FEWEST_DIGITS = 4.0
+# profiles are decomposed to at least this accuracy, a natural logarithm
+FEWEST_PROFILE_DIGITS = 4.0
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def decompose(
     is_point = sources.kind == "point"
     parts = [points(sources.x[is_point], sources.y[is_point], rate[is_point])]
     # sums of Gaussians are kept: few different accuracies
-    digits = 2 * np.ceil(0.5 * np.maximum(digits, FEWEST_DIGITS))
+    digits = 2 * np.ceil(0.5 * np.maximum(digits, FEWEST_PROFILE_DIGITS))
     smooth = np.isfinite(sources.index)
     for n, accuracy in sorted(set(zip(sources.index[smooth], digits[smooth], strict=True))):
         chosen = np.flatnonzero((sources.index == n) & (digits == accuracy))
@@ -130,7 +131,7 @@ def decompose(
                 )
             )
     everything = join(parts)
-    longest = float(digits.max(initial=FEWEST_DIGITS))
+    longest = float(digits.max(initial=FEWEST_PROFILE_DIGITS))
     return _shorten(everything.take(everything.rate != 0), longest, 4 * cell)
 
 

@@ -26,7 +26,8 @@ from .threads import alongside
 LARGEST_DISC = 400.0
 # share of the error allowed that each Gaussian may take where it is cut or sampled
 SHARE = 0.02
-FEWEST_DIGITS = 3.0
+# Gaussians are not cut where they are brighter than this, a natural logarithm
+FEWEST_CUT_DIGITS = 3.0
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
@@ -163,7 +164,7 @@ def _digits(plan: Plan, gaussians: Gaussians, allowed: float) -> Array:
     )
     with np.errstate(divide="ignore"):
         digits: Array = np.log(height / (SHARE * allowed))
-    return np.clip(digits, FEWEST_DIGITS, plan.digits)
+    return np.clip(digits, FEWEST_CUT_DIGITS, plan.digits)
 
 
 def _own_levels(plan: Plan, gaussians: Gaussians, digits: Array) -> NDArray[np.intp]:

@@ -17,8 +17,9 @@ from .direct import has_sharp_edge
 from .discs import disc_half_sizes
 from .folding import fold_half, fold_rows
 from .optics import Optics
-from .profiles import disc_envelope, sersic_transform, sersic_value
-from .stamps import transform
+from .profiles import sersic_value
+from .stamps import needed_limit, on_axes, transform
+from .windows import Window, overlap, place
 
 Array = NDArray[np.float64]
 
@@ -40,15 +41,22 @@ class MovingSource:
         The source, of length 1; its position does not matter.
     rate : float
         Its count rate.
-    allowed : float
-        Light below this, cps per pixel, may be left out.
+    half : (int, int)
+        Half-sizes (y, x) of the window in pixels.
+    limit : float
+        Highest frequency, cycles per pixel.
     """
 
-    def __init__(self, optics: Optics, one: SourceArrays, rate: float, allowed: float) -> None:
-        share = SHARE * allowed
-        limit = _needed_limit(optics, one, rate, share)
-        self.half = _half_sizes(optics, one, rate, share)
-        self.period = tuple(int(fft.next_fast_len(2 * h + 1, real=True)) for h in self.half)
+    def __init__(
+        self,
+        optics: Optics,
+        one: SourceArrays,
+        rate: float,
+        half: tuple[int, int],
+        limit: float,
+    ) -> None:
+        self.half = half
+        self.period = tuple(int(fft.next_fast_len(2 * h + 1, real=True)) for h in half)
         my, mx = (int(limit * period) for period in self.period)
         self.ky = np.concatenate([np.arange(my + 1), np.arange(-my, 0)]) / self.period[0]
         self.kx = np.arange(mx + 1) / self.period[1]
@@ -57,28 +65,47 @@ class MovingSource:
             spectrum *= transform(one, self.ky, self.kx)
         self.spectrum = spectrum
 
-    def place(self, y: float, x: float) -> tuple[int, int, Array]:
-        """Image of the source at (y, x), and the row and column of its first pixel."""
+    def add(self, image: Array, y: float, x: float) -> Window | None:
+        """Add the source at (y, x) to an image, and return the window in which it lies."""
         row, column = round(y) - self.half[0], round(x) - self.half[1]
+        ny, nx = 2 * self.half[0] + 1, 2 * self.half[1] + 1
+        if overlap(image.shape, row, column, (ny, nx)) is None:
+            return None
         turned = self.spectrum * np.exp(-2j * np.pi * self.ky * (y - row))[:, None]
         turned *= np.exp(-2j * np.pi * self.kx * (x - column))
         upper = self.ky.size // 2 + 1
-        folded = np.empty((self.period[0], self.kx.size), dtype=np.complex128)
-        fold_rows(turned[:upper], turned[upper:], self.period[0], folded)
-        image = fft.irfft2(fold_half(folded, self.period[1]), self.period)
-        return row, column, image[: 2 * self.half[0] + 1, : 2 * self.half[1] + 1]
+        columns = fft.ifft(fold_rows(turned[:upper], turned[upper:], self.period[0]), axis=0)[:ny]
+        own = fft.irfft(fold_half(columns, self.period[1]), self.period[1], axis=1)[:, :nx]
+        return place(image, own, row, column)
 
 
-def can_move(
+def moving_source(
     optics: Optics, one: SourceArrays, rate: float, allowed: float, shape: tuple[int, int]
-) -> bool:
-    """Whether a `MovingSource` serves: its window is no larger than twice the frame."""
+) -> MovingSource | None:
+    """Make a `MovingSource`, unless its window would be larger than twice the frame.
+
+    Parameters
+    ----------
+    optics : Optics
+        The transfer function.
+    one : SourceArrays
+        The source, of length 1.
+    rate : float
+        Its count rate.
+    allowed : float
+        Light below this, cps per pixel, may be left out.
+    shape : (int, int)
+        Frame in pixels.
+    """
     if has_sharp_edge(optics, allowed / rate, optics.extent + 50.0, 1.0):
-        return False
-    half = _half_sizes(optics, one, rate, SHARE * allowed)
-    limit = _needed_limit(optics, one, rate, SHARE * allowed)
+        return None
+    share = SHARE * allowed
+    half = _half_sizes(optics, one, rate, share)
+    limit = _limit(optics, one, rate, share)
     modes = 8 * half[0] * half[1] * limit**2
-    return modes <= MOST_MODES and half[0] <= shape[0] and half[1] <= shape[1]
+    if modes > MOST_MODES or half[0] > shape[0] or half[1] > shape[1]:
+        return None
+    return MovingSource(optics, one, rate, half, limit)
 
 
 def _half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> tuple[int, int]:
@@ -116,29 +143,8 @@ def _wing(optics: Optics, level: float) -> float:
     return float(RADII[-1] * np.sqrt(envelope[-1] / level))
 
 
-def _needed_limit(optics: Optics, one: SourceArrays, rate: float, share: float) -> float:
+def _limit(optics: Optics, one: SourceArrays, rate: float, share: float) -> float:
     """Frequency beyond which a source's spectrum adds up to less than ``share``."""
     limit = optics.band_limit(1e-3 * min(share * optics.point_area / rate, 1.0))
     k: Array = (np.arange(240.0) + 0.5) * (limit / 240)
-    zero: Array = np.zeros(1)
-    amplitude = np.maximum(
-        np.abs(optics.transfer(zero, k)[0]), np.abs(optics.transfer(k, zero)[:, 0])
-    )
-    if one.kind[0] != "point":
-        angle = (np.arange(24) + 0.5) * (np.pi / 24) + float(np.radians(one.pa[0]))
-        ratio = 1 - float(one.ellipticity[0])
-        q = (
-            2
-            * np.pi
-            * float(one.r_half[0])
-            * np.outer(k, np.hypot(np.cos(angle), ratio * np.sin(angle)))
-        )
-        profile = (
-            disc_envelope(q)
-            if one.kind[0] == "uniform"
-            else sersic_transform(float(one.index[0]), q)
-        )
-        amplitude = amplitude * profile.mean(axis=1)
-    tail = np.cumsum((2 * np.pi * k * amplitude)[::-1])[::-1] * (limit / 240) * abs(rate)
-    needed = np.flatnonzero(tail > share)
-    return float(k[needed[-1]] + limit / 240) if needed.size else 0.0
+    return needed_limit(k, on_axes(optics, k), one, rate, share)

@@ -8,7 +8,6 @@ inverted at that rate only.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -24,13 +23,16 @@ from .optics import Transfer
 from .painting import half_patch, half_patches, paint
 from .plan import NEAR_UNIT, Plan, spread_cut
 from .rings import Band, band_transfer
-from .threads import in_threads
+from .threads import blocks, for_each
+from .wrapping import wrapped_transfer
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 
 # points of the mesh, some 5 GB of memory in all
 LARGEST_MESH = 5e8
+# the fine mesh's share of the frequencies
+NEAR = Band(-1, -1, 0)
 # rows and columns transformed at a time
 ROWS = 64
 COLUMNS = 48
@@ -40,12 +42,14 @@ COLUMNS = 48
 class Axis:
     """One axis: position of the first point, period in pixels, points, and kept frequencies.
 
-    The frequencies are the multiples of 1 / period from 0 to ``modes``.
+    Only the first ``painted`` of the ``count`` points may hold anything. The frequencies are the
+    multiples of 1 / period from 0 to ``modes``.
     """
 
     start: int
     period: int
     count: int
+    painted: int
     modes: int
 
 
@@ -94,20 +98,16 @@ def near_rate(
             f"this frame, PSF and accuracy need a mesh of {y.count} x {x.count} points, more than "
             "fits into memory; choose a smaller frame, a larger tolerance or a wider PSF."
         )
+    filtered = _filter(plan.filters, y.period, x.period)
     # room for the transform of each row in its own place
-    rows = np.zeros((y.count, 2 * (x.count // 2 + 1)))
-    mesh = rows[:, : x.count]
+    rows = np.zeros((y.painted, 2 * (x.count // 2 + 1)))
+    mesh = rows[:, : x.painted]
     start, cell, spread = (float(y.start), float(x.start)), plan.near_cell, plan.near_spread()
     paint(mesh, start, cell, gaussians, spread, cut)
     paint_discs(mesh, start, cell, discs, disc_rate, spread, plan.digits)
     if len(large):
         paint_large_discs(mesh, start, cell, large, large_rate, spread, plan.digits)
-    spectrum = _filtered(rows, y, x, _filter(plan.filters, y.period, x.period))
-    del mesh, rows
-    values = fft.irfft2(spectrum, (y.period, x.period), workers=-1, overwrite_x=True)
-    in_y, in_x = np.arange(shape[0]) - y.start, np.arange(shape[1]) - x.start
-    wanted: Array = values[np.ix_(in_y % y.period, in_x % x.period)]
-    return wanted
+    return _at_pixels(rows, y, x, filtered, shape)
 
 
 def _axes(
@@ -119,13 +119,13 @@ def _axes(
     large: bool,
 ) -> tuple[Axis, Axis]:
     """Lay out a mesh that holds what is painted and where the kernel does not wrap around."""
-    cell, spread, reach = plan.near_cell, plan.near_spread(), plan.reach(-1)
+    cell, spread = plan.near_cell, plan.near_spread()
     disc_half = disc_half_sizes(discs)
     axes = []
     for axis in (0, 1):
         # at least so much, that scenes in the frame share their filters
         edge = cell * (half_patch(spread**2, cell, plan.cut()) + 1.0)
-        edge += reach if large else 0.0
+        edge += plan.reach(-1) if large else 0.0
         low, high = -edge, shape[axis] - 1 + edge
         variance = (gaussians.yy, gaussians.xx)[axis] + spread**2
         for centre, half in (
@@ -135,9 +135,12 @@ def _axes(
             low = min(low, float((centre - half).min(initial=np.inf)))
             high = max(high, float((centre + half).max(initial=-np.inf)))
         start = int(np.floor(low))
-        need = max(high - start, shape[axis] - 1 + reach - low, high + reach) + 1
+        need = plan.near_period(axis, shape[axis], start, high)
         period = NEAR_UNIT * fft.next_fast_len(int(np.ceil(need / NEAR_UNIT)), real=True)
-        axes.append(Axis(start, period, round(period / cell), int(plan.highest * period)))
+        count = round(period / cell)
+        # what covers everything must not end, not even out of reach
+        painted = count if large else min(int((high - start) / cell) + 2, count)
+        axes.append(Axis(start, period, count, painted, int(plan.highest * period)))
     return axes[0], axes[1]
 
 
@@ -151,9 +154,17 @@ def _filter(plan: Plan, period_y: int, period_x: int) -> Transfer:
     ky, kx = (np.arange(int(plan.highest * p) + 1) / p for p in (period_y, period_x))
     if not plan.optics.radial:
         ky = np.concatenate([ky, -ky[:0:-1]])
-    filtered = np.empty((ky.size, kx.size), dtype=np.float64 if plan.optics.radial else complex)
-    for block in _blocks(ky.size, ROWS):  # temporary arrays stay small
-        filtered[block] = high_pass(plan, ky[block], kx)
+    filtered: Transfer
+    if plan.wraps:
+        filtered = wrapped_transfer(plan, NEAR, period_y, period_x)
+    else:
+        filtered = np.empty((ky.size, kx.size), dtype=np.float64 if plan.optics.radial else complex)
+    for block in blocks(ky.size, ROWS):  # temporary arrays stay small
+        if plan.wraps:
+            filtered[block] *= plan.optics.pixel(ky[block], kx)
+            filtered[block][np.hypot(ky[block, None], kx) > plan.highest] = 0.0
+        else:
+            filtered[block] = high_pass(plan, ky[block], kx)
         filtered[block] *= cell**2 * np.exp(2 * (np.pi * spread * ky[block]) ** 2)[:, None]
         filtered[block] *= np.exp(2 * (np.pi * spread * kx) ** 2)
     return filtered
@@ -162,36 +173,41 @@ def _filter(plan: Plan, period_y: int, period_x: int) -> Transfer:
 def high_pass(plan: Plan, ky: Array, kx: Array) -> Transfer:
     """Transfer function above the meshes' band, on the grid (ky, kx) in cycles per pixel."""
     limit = plan.highest if plan.optics.radial else np.inf
-    return band_transfer(plan, Band(-1, -1, 0), ky, kx, limit)
+    return band_transfer(plan, NEAR, ky, kx, limit)
 
 
-def _filtered(rows: Array, y: Axis, x: Axis, filtered: Transfer) -> Spectrum:
-    """Half-spectrum at the pixel rate of a mesh, filtered, all aliases summed.
+def _at_pixels(rows: Array, y: Axis, x: Axis, filtered: Transfer, shape: tuple[int, int]) -> Array:
+    """Filter a mesh, sum all aliases and invert at the frame's pixels.
 
-    ``rows`` holds the mesh in its first columns and is overwritten.
+    ``rows`` holds the mesh in its first columns and is overwritten. Along each axis only what
+    is painted is transformed, and only what is wanted is kept.
     """
     half = rows.view(np.complex128)
 
     def transform_rows(block: slice) -> None:
-        half[block] = fft.rfft(rows[block, : x.count], axis=1)
+        half[block] = fft.rfft(rows[block, : x.painted], x.count, axis=1)
 
-    for _ in in_threads(transform_rows, _blocks(y.count, ROWS)):
-        pass
+    for_each(transform_rows, blocks(y.painted, ROWS))
     radial = filtered.shape[0] == y.modes + 1
-    folded = np.empty((y.period, x.modes + 1), dtype=np.complex128)
+    in_y, in_x = (
+        (np.arange(n) - axis.start) % axis.period for n, axis in zip(shape, (y, x), strict=True)
+    )
+    inverted = np.empty((shape[0], x.modes + 1), dtype=np.complex128)
 
-    def fold_columns(columns: slice) -> None:
-        spectrum = fft.fft(half[:, columns], axis=0)
+    def invert_columns(columns: slice) -> None:
+        spectrum = fft.fft(half[:, columns], y.count, axis=0)
         weight = filtered[:, columns]
         upper, lower = spectrum[: y.modes + 1], spectrum[y.count - y.modes :]
         upper *= weight[: y.modes + 1]
         lower *= weight[:0:-1] if radial else weight[y.modes + 1 :]
-        fold_rows(upper, lower, y.period, folded[:, columns])
+        folded = fold_rows(upper, lower, y.period)
+        inverted[:, columns] = fft.ifft(folded, axis=0, overwrite_x=True)[in_y]
 
-    for _ in in_threads(fold_columns, _blocks(x.modes + 1, COLUMNS)):
-        pass
-    return fold_half(folded, x.period)
+    for_each(invert_columns, blocks(x.modes + 1, COLUMNS))
+    wanted = np.empty(shape)
 
+    def invert_rows(block: slice) -> None:
+        wanted[block] = fft.irfft(fold_half(inverted[block], x.period), x.period, axis=1)[:, in_x]
 
-def _blocks(count: int, size: int) -> Iterator[slice]:
-    return (slice(first, min(first + size, count)) for first in range(0, count, size))
+    for_each(invert_rows, blocks(shape[0], ROWS))
+    return wanted

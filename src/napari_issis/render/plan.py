@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from .optics import Optics
-from .rings import fading, first_edge, ring_fade, ring_reach
+from .rings import fading, first_edge, ring_fade, ring_reach, wrap_fade, wrap_fading
 
 Array = NDArray[np.float64]
 
@@ -59,6 +59,11 @@ class Plan:
     ring_fade : float
         Argument of the error function with which the cut begins and ends: what it changes is
         exp(-ring_fade^2) of the rings there.
+    seen : (float, float)
+        Largest distances in pixels, along y and x, between a pixel and a source.
+    wrap_fade : float
+        Argument of the error function with which the fine mesh's kernel fades out beyond
+        ``seen``, so that it may wrap around; zero if it must not.
     """
 
     optics: Optics
@@ -68,14 +73,23 @@ class Plan:
     near: str
     ring_cut: float = np.inf
     ring_fade: float = 0.0
+    seen: tuple[float, float] = (np.inf, np.inf)
+    wrap_fade: float = 0.0
 
     @property
     def highest(self) -> float:
         """Frequency in cycles per pixel above which nothing passes."""
         highest = _highest(self.optics, self.digits)
         if self.ring_cut < np.inf:
-            highest += self.ring_fade / (np.pi * fading(self.optics))
+            cut = self.ring_fade / fading(self.optics)
+            wrap = self.wrap_fade / wrap_fading(self.optics)
+            highest += max(cut, wrap) / np.pi
         return highest
+
+    @property
+    def wraps(self) -> bool:
+        """Whether the fine mesh's kernel wraps around where nobody looks."""
+        return self.wrap_fade > 0
 
     @property
     def near_cell(self) -> float:
@@ -87,10 +101,19 @@ class Plan:
         """Width in pixels of the Gaussian with which points are spread on the fine mesh."""
         return self.near_cell * _spread(self.digits, self.near_cell * self.highest)
 
+    def near_period(self, axis: int, pixels: int, low: float, high: float) -> float:
+        """Least period of the fine mesh along an axis of some pixels, painted from low to high."""
+        if self.wraps:
+            room = self._without_rings(-1)
+            least = 2 * (self.seen[axis] + self.wrap_fade * wrap_fading(self.optics))
+        else:
+            room, least = self.reach(-1), 0.0
+        return max(high - low, pixels - 1 + room - low, high + room, least) + 1
+
     @property
     def filters(self) -> Plan:
-        """The plan as far as filters depend on it: on how faint rings matter only reaches do."""
-        return replace(self, ring_digits=0.0)
+        """The plan as far as filters depend on it: what else it holds is for reaches only."""
+        return replace(self, ring_digits=0.0, seen=(np.inf, np.inf))
 
     def cell_size(self, level: int) -> float:
         """Cell of a mesh in pixels."""
@@ -176,6 +199,7 @@ def make_plan(
     accuracy: float,
     ring_accuracy: float,
     farthest: float,
+    seen: tuple[float, float],
     points: int,
     extended: int,
     sharp_edge: bool = False,
@@ -195,6 +219,8 @@ def make_plan(
         Error allowed in the rings over the peak of the source that has the strongest.
     farthest : float
         Largest distance in pixels between a pixel and a source whose rings matter.
+    seen : (float, float)
+        Largest distances in pixels, along y and x, between a pixel and any source.
     points, extended : int
         Numbers of sources.
     sharp_edge : bool
@@ -220,20 +246,36 @@ def make_plan(
             return _with_rings_cut(wide, farthest)
     mesh = _with_rings_cut(Plan(optics, digits, ring_digits, 1.0, near="mesh"), farthest)
     stamps = replace(mesh, near="stamps")
+    shorter = any(2 * d < n + mesh.reach(-1) for d, n in zip(seen, shape, strict=True))
+    if shorter and mesh._has_rings(-1) and not meshes_only:
+        wrapped = _wrapped(mesh, seen)
+        if _mesh_seconds(wrapped, shape, points) < _mesh_seconds(mesh, shape, points):
+            mesh = wrapped
     if meshes_only or _mesh_seconds(mesh, shape, points) < _stamp_seconds(stamps, points, extended):
         return mesh
     return stamps
 
 
-def _with_rings_cut(plan: Plan, farthest: float) -> Plan:
-    """Cut the rings of a plan if they reach further than needed."""
+def _with_rings_cut(plan: Plan, farthest: float, *, always: bool = False) -> Plan:
+    """Cut the rings of a plan, by default only if they reach further than needed."""
     cut = RING_STEP * float(np.ceil(farthest / RING_STEP))
     levels = [j for j in range(-1 if plan.near else 0, 3) if plan._has_rings(j)]
-    if all(_ring_reach(plan, j) <= max(cut, plan._without_rings(j)) for j in levels):
+    faded = all(_ring_reach(plan, j) <= max(cut, plan._without_rings(j)) for j in levels)
+    if faded and not always:
         return plan
     plan = replace(plan, ring_cut=cut)
     fade = max(ring_fade(plan, j, plan._without_rings(j), plan.ring_begin(j)) for j in levels)
     return replace(plan, ring_fade=0.5 * float(np.ceil(2 * max(fade, 1.0))))
+
+
+def _wrapped(plan: Plan, seen: tuple[float, float]) -> Plan:
+    """Let the fine mesh's kernel wrap around beyond the distances seen.
+
+    The rings are cut beyond these in any case, so that the kernel comes to an end.
+    """
+    plan = _with_rings_cut(replace(plan, ring_cut=np.inf), float(np.hypot(*seen)), always=True)
+    fade = wrap_fade(plan, -1, plan._without_rings(-1), min(seen))
+    return replace(plan, seen=seen, wrap_fade=0.25 * float(np.ceil(4 * max(fade, 1.0))))
 
 
 @lru_cache(maxsize=256)
@@ -259,10 +301,10 @@ def _spread(digits: float, band: float) -> float:
 
 def _mesh_seconds(plan: Plan, shape: tuple[int, int], points: int) -> float:
     """Rough run time of the fine mesh."""
-    cell = plan.near_cell
-    edge = plan.reach(-1) + 2 * plan.cut() * plan.near_spread()
-    patch = (2 * plan.cut() * plan.near_spread() / cell) ** 2
-    return 1.1e-8 * float(np.prod([(n + edge) / cell for n in shape])) + 3e-9 * points * patch
+    cell, edge = plan.near_cell, plan.cut() * plan.near_spread()
+    periods = [plan.near_period(i, n, -edge, n - 1 + edge) for i, n in enumerate(shape)]
+    patch = (2 * edge / cell) ** 2
+    return 1.1e-8 * float(np.prod(periods)) / cell**2 + 3e-9 * points * patch
 
 
 def _stamp_seconds(plan: Plan, points: int, extended: int) -> float:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from ..psf import RadialPSF
+from .hankel import hankel_nodes
 from .optics import Optics, Transfer
 
 if TYPE_CHECKING:
@@ -58,11 +59,24 @@ def band_transfer(plan: Plan, band: Band, ky: Array, kx: Array, limit: float) ->
 
     ``limit`` is the highest frequency wanted, cycles per pixel.
     """
+    if plan.cuts_rings(band.level):
+        return cut_transfer(plan, band, ky, kx, limit) * plan.optics.pixel(ky, kx)
     k = np.hypot(ky[:, None], kx)
     transfer: Transfer = plan.optics.transfer(ky, kx, limit) * band.share(plan, k)
-    if plan.cuts_rings(band.level):
-        transfer += np.interp(k, *_change(plan, band)) * plan.optics.pixel(ky, kx)
     transfer[k > limit] = 0.0
+    return transfer
+
+
+def cut_transfer(plan: Plan, band: Band, ky: Array, kx: Array, limit: float) -> Array:
+    """`band_transfer` with the rings cut and without the pixel."""
+    psf = plan.optics.psf
+    assert isinstance(psf, RadialPSF)
+    k = np.hypot(ky[:, None], kx)
+    transfer = np.zeros_like(k)
+    passed = k <= limit
+    k = k[passed]
+    transfer[passed] = psf.otf(k / plan.optics.pixel_scale) * band.share(plan, k)
+    transfer[passed] += np.interp(k, *_change(plan, band))
     return transfer
 
 
@@ -113,16 +127,41 @@ def ring_fade(plan: Plan, level: int, start: float, begin: float) -> float:
     At every smaller distance, too, the fading must change less of the kernel than the accuracy
     allows; within ``start`` it may be as high as the peak.
     """
+    r, envelope = _envelope_within(plan, level, start, begin)
+    # what is lost of rings at a distance r is sqrt(k r) times as high in their centre
+    lost = 10 * np.pi * np.sqrt(plan.highest * begin) * envelope
+    needed = np.sqrt(np.maximum(np.log(lost) + plan.ring_digits, 0.0))
+    return float(np.max(needed - (begin - r) / fading(plan.optics)))
+
+
+def wrap_fade(plan: Plan, level: int, start: float, begin: float) -> float:
+    """Argument of the error function with which a kernel must begin to fade along an axis.
+
+    The window multiplies the kernel itself. At either end of both axes it takes half of
+    erfc(argument) away, and what wraps around adds as much.
+    """
+    r, envelope = _envelope_within(plan, level, start, begin)
+    allowed = np.exp(-plan.ring_digits) / (2 * envelope)
+    needed = special.erfcinv(np.minimum(allowed, 1.0))
+    return float(np.max(needed - (begin - r) / wrap_fading(plan.optics)))
+
+
+def wrap_fading(optics: Optics) -> float:
+    """Width in pixels of the error function with which a kernel is faded out along an axis.
+
+    A wider one needs a longer period, a narrower one higher frequencies.
+    """
+    return 4.0 / first_edge(optics)
+
+
+def _envelope_within(plan: Plan, level: int, start: float, begin: float) -> tuple[Array, Array]:
+    """`_envelope` out to ``begin``; within ``start`` it is as high as the peak."""
     r, envelope = _envelope(plan.filters, level, start)
     if begin > r[-1]:
         r = np.append(r, begin)
         envelope = np.append(envelope, envelope[-16] * (r[-2] / begin) ** 3)
     inside = r <= begin
-    r, envelope = np.append(r[inside], start), np.append(envelope[inside], 1.0)
-    # what is lost of rings at a distance r is sqrt(k r) times as high in their centre
-    lost = 10 * np.pi * np.sqrt(plan.highest * begin) * envelope
-    needed = np.sqrt(np.maximum(np.log(lost) + plan.ring_digits, 0.0))
-    return float(np.max(needed - (begin - r) / fading(plan.optics)))
+    return np.append(r[inside], start), np.append(envelope[inside], 1.0)
 
 
 @lru_cache(maxsize=64)
@@ -134,14 +173,9 @@ def _envelope(plan: Plan, level: int, start: float) -> tuple[Array, Array]:
     """
     psf = plan.optics.psf
     assert isinstance(psf, RadialPSF)
-    limit = plan.highest
     r = start * np.geomspace(1.0, 6.0, 160)
-    # Gauss-Legendre on panels of less than two oscillations each
-    x, w = np.polynomial.legendre.leggauss(16)
-    panels = int(limit * r[-1]) + 8
-    k = ((np.arange(panels)[:, None] + 0.5 * (x + 1)) * (limit / panels)).ravel()
-    weight = np.tile(w, panels)
-    measure = weight * k * psf.otf(k / plan.optics.pixel_scale)
+    k, measure = hankel_nodes(plan.highest, r[-1])
+    measure *= psf.otf(k / plan.optics.pixel_scale)
     # for the peak, the pixel as a Gaussian of the same variance
     peak = abs(np.sum(measure * np.exp(-(np.pi**2) * k**2 / 6)))
     # a ring is averaged least in the direction of the pixel's sides: the envelope of sinc(k)

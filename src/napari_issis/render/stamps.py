@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ..sources import SourceArrays
 from .discs import disc_half_sizes, elliptical_frequency
 from .near import high_pass
-from .optics import Transfer
+from .optics import Optics, Transfer
 from .plan import Plan
 from .profiles import disc_envelope, disc_transform, sersic_gaussians, sersic_transform
+from .windows import place
 
 Array = NDArray[np.float64]
 CHUNK = 32
@@ -131,7 +132,7 @@ def _add_points(image: Array, plan: Plan, y: Array, x: Array, rate: Array, reach
         sin_y *= rate[part, None, None]
         stamps = _images(spectrum, None, cos_y, sin_y, cos_x, sin_x)
         for stamp, r, c in zip(stamps, row[part], column[part], strict=True):
-            _place(image, stamp, int(r) - half, int(c) - half)
+            place(image, stamp, int(r) - half, int(c) - half)
 
 
 def _images(
@@ -157,7 +158,9 @@ def _images(
 def _add_extended(
     image: Array, plan: Plan, one: SourceArrays, rate: float, reach: float, allowed: float
 ) -> None:
-    limit = _needed_limit(plan, one, rate, allowed)
+    if plan.highest <= 0:
+        return
+    limit = needed_limit(*_radial_high_pass(plan), one, rate, allowed)
     if limit <= 0:
         return
     half_y, half_x = _half_sizes(plan, one, rate, reach, allowed)
@@ -181,7 +184,7 @@ def _add_extended(
     else:
         spectrum = high_pass(plan, ky, kx) * profile * grid_x.weight * grid_y.weight[0]
         stamp = _images(spectrum, None, cos_y, sin_y, cos_x, sin_x)[0]
-    _place(image, stamp, row - half_y, column - half_x)
+    place(image, stamp, row - half_y, column - half_x)
 
 
 @lru_cache(maxsize=256)
@@ -203,38 +206,44 @@ def transform(one: SourceArrays, ky: Array, kx: Array) -> Array:
     return sersic_transform(float(one.index[0]), q)
 
 
-def _needed_limit(plan: Plan, one: SourceArrays, rate: float, allowed: float) -> float:
-    """Frequency beyond which a source's high-passed spectrum adds up to less than allowed."""
-    limit = plan.highest
-    if limit <= 0:
-        return 0.0
-    k, high = _radial_high_pass(plan, limit)
-    angle = (np.arange(24) + 0.5) * (np.pi / 24)
-    ky, kx = np.outer(k, np.sin(angle)), np.outer(k, np.cos(angle))
-    pa = np.radians(one.pa[0])
-    along = ky * np.cos(pa) - kx * np.sin(pa)
-    across = (1 - one.ellipticity[0]) * (ky * np.sin(pa) + kx * np.cos(pa))
-    q = 2 * np.pi * one.r_half[0] * np.hypot(along, across)
-    if one.kind[0] == "uniform":
-        profile = disc_envelope(q)
-    else:
-        profile = sersic_transform(float(one.index[0]), q)
-    step = limit / k.size
-    amplitude = profile.mean(axis=1) * high
+def needed_limit(
+    k: Array, transfer: Array, one: SourceArrays, rate: float, allowed: float
+) -> float:
+    """Frequency beyond which a source's spectrum adds up to less than ``allowed``.
+
+    ``k`` are the midpoints of equal steps from zero, cycles per pixel, and ``transfer`` is the
+    modulus of the transfer function there.
+    """
+    amplitude = transfer
+    if one.kind[0] != "point":
+        angle = (np.arange(24) + 0.5) * (np.pi / 24) + np.radians(one.pa[0])
+        stretch = np.hypot(np.cos(angle), (1 - one.ellipticity[0]) * np.sin(angle))
+        q = 2 * np.pi * one.r_half[0] * np.outer(k, stretch)
+        if one.kind[0] == "uniform":
+            profile = disc_envelope(q)
+        else:
+            profile = sersic_transform(float(one.index[0]), q)
+        amplitude = transfer * profile.mean(axis=1)
+    step = 2 * k[0]
     tail = np.cumsum((2 * np.pi * k * amplitude)[::-1])[::-1] * step * abs(rate)
     needed = np.flatnonzero(tail > allowed)
     return float(k[needed[-1]] + step) if needed.size else 0.0
 
 
 @lru_cache(maxsize=16)
-def _radial_high_pass(plan: Plan, limit: float) -> tuple[Array, Array]:
-    """Return frequencies up to a limit, and the larger high-passed transfer on either axis."""
-    k = (np.arange(160, dtype=np.float64) + 0.5) * (limit / 160)
+def _radial_high_pass(plan: Plan) -> tuple[Array, Array]:
+    """Return frequencies, and the larger high-passed transfer on either axis."""
+    k = (np.arange(160, dtype=np.float64) + 0.5) * (plan.highest / 160)
+    return k, on_axes(plan.optics, k) * (1 - plan.lowpass(k, 0))
+
+
+def on_axes(optics: Optics, k: Array) -> Array:
+    """Modulus of the transfer function on the axis where it is larger."""
     zero: Array = np.zeros(1)
-    transfer = np.maximum(
-        np.abs(plan.optics.transfer(zero, k)[0]), np.abs(plan.optics.transfer(k, zero)[:, 0])
+    larger: Array = np.maximum(
+        np.abs(optics.transfer(zero, k)[0]), np.abs(optics.transfer(k, zero)[:, 0])
     )
-    return k, transfer * (1 - plan.lowpass(k, 0))
+    return larger
 
 
 def _half_sizes(
@@ -245,9 +254,8 @@ def _half_sizes(
         half_y, half_x = disc_half_sizes(one)
         return int(np.ceil(half_y[0] + reach)), int(np.ceil(half_x[0] + reach))
     gaussians = sersic_gaussians(float(one.index[0]), plan.digits + 3)
-    limit = plan.highest
-    k, high = _radial_high_pass(plan, limit)
-    amplitude = 2 * np.pi * k * high * (limit / k.size)
+    k, high = _radial_high_pass(plan)
+    amplitude = 2 * np.pi * k * high * (2 * k[0])
     major = one.r_half[0] * gaussians.sigma
     minor = major * (1 - one.ellipticity[0])
     level = np.exp(-2 * (np.pi * minor[:, None] * k) ** 2) @ amplitude
@@ -263,14 +271,3 @@ def _half_sizes(
         own = np.sqrt(2 * plan.digits) * widest * direction
         sizes.append(int(np.ceil(np.hypot(reach, own))))
     return sizes[0], sizes[1]
-
-
-def _place(image: Array, stamp: Array, row: int, column: int) -> None:
-    """Add the part of a stamp that lies in the image; (row, column) is its first pixel."""
-    top, left = max(row, 0), max(column, 0)
-    bottom = min(row + stamp.shape[0], image.shape[0])
-    right = min(column + stamp.shape[1], image.shape[1])
-    if top < bottom and left < right:
-        image[top:bottom, left:right] += stamp[
-            top - row : bottom - row, left - column : right - column
-        ]

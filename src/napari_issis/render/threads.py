@@ -56,3 +56,13 @@ def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterato
             yield ahead.popleft().result()
     while ahead:
         yield ahead.popleft().result()
+
+
+def for_each(work: Callable[[Item], None], items: Iterable[Item]) -> None:
+    """Do ``work`` for every item."""
+    deque(in_threads(work, items), maxlen=0)
+
+
+def blocks(count: int, size: int) -> Iterator[slice]:
+    """Cut a range into slices of a size."""
+    return (slice(first, min(first + size, count)) for first in range(0, count, size))

@@ -8,7 +8,7 @@ from astropy.table import vstack
 from scipy import special
 
 from napari_issis import GaussianPSF, Observation, source
-from napari_issis.signal_to_noise import expected_counts, signal_to_noise
+from napari_issis.source_counts import expected_counts, signal_to_noise
 
 SCALE = 0.036
 
