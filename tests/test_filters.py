@@ -1,8 +1,11 @@
 """Filters with a response: what they pass, and what they are read from."""
 
+import warnings
+
 import astropy.units as u
 import numpy as np
 import pytest
+from astropy.io import fits
 from astropy.table import QTable, Table
 from scipy.integrate import quad
 
@@ -171,13 +174,17 @@ def named_peak(name):
 
 
 def test_curves_render_and_neutral_filters_do_not():
-    """The rate behind curve and NF1 is a tenth of that behind the curve, bit for bit."""
+    """The rate behind curve and NF1 is a tenth of that behind the curve, bit for bit.
+
+    Catches a rate rendered without the curve.
+    """
     from napari_issis.exposure import noise_ready_rate
 
     observation = ni.Observation(filters=(CURVE, "open"), shape=(32, 32))
     star = ni.source("point", 16, 16, 1e-15)
     rate, _ = noise_ready_rate(star, observation)
-    assert rate.max() > 0
+    passed = integral(lambda w: curve(w) * w) / (0.5 * (3200**2 - 1850**2))
+    assert rate.sum() == pytest.approx(1e-15 * 1.14e17 * passed, rel=0.05)
     assert np.array_equal(
         noise_ready_rate(star, observation.replace(filters=(CURVE, "NF1")))[0], rate * 0.1
     )
@@ -348,13 +355,39 @@ OBSERVATIONS = {
 def test_fits_keeps_sky_and_filters(name, compress, tmp_path):
     """Catches a sky or a curve that comes back as the default, or as a name only."""
     made = ni.simulate(ni.source("point", 1, 1, 1e-15), OBSERVATIONS[name])
-    made.write(tmp_path / "x.fits", compress=compress)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made.write(tmp_path / "x.fits", compress=compress)
     read = ni.Exposure.read(tmp_path / "x.fits")
     assert read == made
     assert read.observation.sky == made.observation.sky
     assert read.observation.filters == made.observation.filters
     table = Table.read(tmp_path / "x.fits", hdu="OBSERVATION")
     assert table["FILTER1"][0] == made.observation.filter_names[0]
+
+
+@pytest.mark.parametrize("fault", ["column", "image", "value", "sky"])
+def test_broken_curves_in_fits(fault, tmp_path):
+    observation = ni.Observation(filters=(CURVE, "open"), sky=ni.Sky(), shape=(2, 2))
+    ni.simulate(ni.random_sources("point", 0), observation).write(tmp_path / "x.fits")
+    with fits.open(tmp_path / "x.fits") as hdus:
+        for hdu in hdus:
+            hdu.add_datasum()
+        if fault == "column":
+            hdus["FILTER1"].columns.change_name("WAVELENGTH", "W")
+        elif fault == "image":
+            hdus["FILTER1"] = fits.ImageHDU(np.zeros((2, 2)), name="FILTER1")
+        elif fault == "value":
+            hdus["FILTER1"].data["TRANSMISSION"][0] = 3
+        else:
+            hdus["OBSERVATION"].data["GEOCORONA"] = "bright"
+        hdus.writeto(tmp_path / "y.fits", checksum=True)
+    message = {
+        "value": "filter odd has the transmission 3",
+        "sky": "geocorona is 'bright'",
+    }.get(fault, "extension FILTER1 holds no filter curve")
+    with pytest.raises(ValueError, match=message):
+        ni.Exposure.read(tmp_path / "y.fits")
 
 
 def test_an_unknown_sky_is_not_written(tmp_path):

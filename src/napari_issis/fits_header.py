@@ -43,7 +43,7 @@ def observation_header(exposure: Exposure) -> fits.Header:
     header["OBSTYPE"] = ("SIMULATION", "no real observation")
     header["CPSFLUX"] = (observation.cps_per_flux, "[ct/s] for 1 erg/s/cm2/A, with filters")
     header["SKYRATE"] = (observation.sky_rate, "[ct/s/pixel] sky, with filters")
-    header["SKYMODEL"] = (sky_description(observation), "how the sky was chosen")
+    header["SKYMODEL"] = sky_description(observation)
     header["DARKRATE"] = (observation.dark, "[ct/s/pixel] of the detector itself")
     header["SKYCOUNT"] = (
         observation.sky_rate * observation.exposure,

@@ -29,14 +29,24 @@ def filter_hdus(observation: Observation) -> list[fits.BinTableHDU]:
 
 
 def stored_filters(row: dict[str, Any], hdus: fits.HDUList) -> tuple[str | Filter, str | Filter]:
-    """Return the filters of the two wheels: a curve where the file holds one, else a name."""
+    """Return the filters of the two wheels: a curve where the file holds one, else a name.
+
+    Raises
+    ------
+    ValueError
+        If an extension that should hold a curve does not.
+    """
     names = [hdu.name for hdu in hdus]
 
     def stored(extension: str) -> str | Filter:
         name = str(row[extension])
         if extension not in names:
             return name
-        table = read_table(hdus[extension])
+        hdu = hdus[extension]
+        columns = hdu.columns.names if isinstance(hdu, fits.BinTableHDU) else []
+        if not {"WAVELENGTH", "TRANSMISSION"} <= set(columns):
+            raise ValueError(f"the extension {extension} holds no filter curve.")
+        table = read_table(hdu)
         return Filter(name, table["WAVELENGTH"], np.asarray(table["TRANSMISSION"]))
 
     first, second = EXTENSIONS
