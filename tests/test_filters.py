@@ -366,6 +366,22 @@ def test_fits_keeps_sky_and_filters(name, compress, tmp_path):
     assert table["FILTER1"][0] == made.observation.filter_names[0]
 
 
+def test_the_header_says_what_is_illustrative(tmp_path):
+    empty = ni.random_sources("point", 0)
+    for filters, said in (
+        (("N2500", "open"), ["FILTER1"]),
+        (("LP2600", "LP2600"), ["FILTER1", "FILTER2"]),
+        (("NF1", CURVE), []),
+    ):
+        made = ni.simulate(empty, ni.Observation(filters=filters, shape=(2, 2)))
+        made.write(tmp_path / "x.fits", overwrite=True)
+        comments = "".join(fits.getheader(tmp_path / "x.fits")["COMMENT"])
+        named = [
+            name for name in ("FILTER1", "FILTER2") if f"{name}: This filter is ill" in comments
+        ]
+        assert named == said
+
+
 @pytest.mark.parametrize("fault", ["column", "image", "value", "sky"])
 def test_broken_curves_in_fits(fault, tmp_path):
     observation = ni.Observation(filters=(CURVE, "open"), sky=ni.Sky(), shape=(2, 2))

@@ -70,4 +70,8 @@ ILLUSTRATIVE_FILTERS = MappingProxyType(
         )
     }
 )
+FILTER_NOTE = (
+    "This filter is illustrative: no curve of an ISSIS filter has been published. Its width, "
+    "transmission and edges are assumed."
+)
 FILTER_NAMES = (*FILTERS, *ILLUSTRATIVE_FILTERS)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from astropy.io import fits
 
+from .filter_set import FILTER_NOTE, ILLUSTRATIVE_FILTERS
+from .filters import Filter
 from .fits_light_path import sky_description
 from .image_psf import ImagePSF
 from .instrument import PSF_NOTE
@@ -62,6 +64,9 @@ def observation_header(exposure: Exposure) -> fits.Header:
     )
     if observation.psf_assumed:
         header["COMMENT"] = PSF_NOTE
+    for number, one in enumerate(observation.filters, start=1):
+        if not isinstance(one, Filter) and one in ILLUSTRATIVE_FILTERS:
+            header["COMMENT"] = f"FILTER{number}: {FILTER_NOTE}"
     return header
 
 
