@@ -12,7 +12,7 @@ import pytest
 from astropy.io import fits
 from PIL import Image
 
-from napari_issis import Exposure, Observation, simulate, source
+from napari_issis import Exposure, Observation, Sky, simulate, source
 from napari_issis import cli as cli_module
 from napari_issis.catalogue import read_sources, write_sources
 from napari_issis.cli import main
@@ -67,6 +67,15 @@ def test_simulate_equals_the_library(star, capsys):
     assert "FUV, open-NF1, 100000 s, seed 9" in captured.out
     assert "assumed" in captured.out
     assert captured.err == ""
+
+
+def test_sky_and_curves_by_name(star):
+    """Catches a sky that is parsed and then forgotten."""
+    arguments = ["simulate", star, "--channel", "FUV", "--filters", "LP1370", "open", *FRAME]
+    assert main([*arguments, "--sky", "high orbit", "--output", "x.fits"]) == 0
+    sky = Sky("high orbit", "average", "high orbit", galactic_latitude=90)
+    observation = Observation("FUV", ("LP1370", "open"), shape=(40, 48), sky=sky)
+    assert Exposure.read("x.fits").observation == observation
 
 
 def test_headline_numbers(capsys):

@@ -12,6 +12,7 @@ from scipy.integrate import trapezoid
 import napari_issis as ni
 from napari_issis.instrument import CHANNELS
 from napari_issis.limits import count_rate_warnings
+from napari_issis.source_counts import signal_to_noise
 
 
 def test_numbers_of_the_paper():
@@ -52,6 +53,30 @@ def test_central_value_of_the_papers_first_example():
     assert image == pytest.approx(central * 0.5 * (one + other), rel=2e-3)
 
 
+def test_dark_counts(tmp_path):
+    """1e-5 cps per pixel behind any filter: catches a dark rate that the filters reduce.
+
+    And one that is left out of B, of the expected counts, of the S/N or of the file.
+    """
+    observation = ni.Observation(
+        filters=("NF2", "NF2"), exposure=1e4, shape=(8, 8), dark=1e-5, background=0.5
+    )
+    empty = ni.random_sources("point", 0)
+    made = ni.simulate(empty, observation)
+    each = 1e4 * (0.5 * 1e-4 + 1e-5)
+    assert made.expected == pytest.approx(np.full((8, 8), each), rel=1e-12)
+    assert made.background == pytest.approx(each, rel=1e-12)
+    lit = made.counts > 0
+    assert made.snr[lit] == pytest.approx((made.counts[lit] - each) / np.sqrt(made.counts[lit]))
+    made.write(tmp_path / "x.fits")
+    assert ni.Exposure.read(tmp_path / "x.fits") == made
+    assert observation != observation.replace(dark=0.0)
+    faint = ni.source("point", 4, 4, 1e-13)
+    dark = observation.replace(dark=0.1)
+    as_sky = dark.replace(background=0.5 + 0.1 / 1e-4, dark=0.0)
+    assert signal_to_noise(faint, dark) == pytest.approx(signal_to_noise(faint, as_sky), rel=1e-9)
+
+
 def test_equal_and_hashable():
     array = np.ones((3, 3))
     first = ni.Observation(psf=ni.ImagePSF(array, 0.01), pointing=SkyCoord(1 * u.deg, 2 * u.deg))
@@ -78,6 +103,8 @@ def test_equal_and_hashable():
         ({"shape": 512}, "shape is 512"),
         ({"shape": (5.5, 5)}, "shape is"),
         ({"background": -1}, "background is -1"),
+        ({"dark": -1e-6}, "dark is -1e-06"),
+        ({"dark": "low"}, "dark is 'low'"),
         ({"roll": np.inf}, "roll is inf"),
         ({"roll": "up"}, "roll is 'up'"),
         ({"psf": 3}, "psf is 3"),

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 from .cluster_profile import ClusterProfile
 from .drag import Drag
 from .exposure import Exposure, simulate
+from .filters import Filter
 from .image_psf import ImagePSF
 from .limits import CountRateWarning
 from .observation import Observation
 from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
+from .sky import SKIES, Sky
 from .source_counts import signal_to_noise
 from .sources import source
 
@@ -44,16 +46,19 @@ _FILES = {
 }
 
 __all__ = [
+    "SKIES",
     "Catalogue",
     "ClusterProfile",
     "CountRateWarning",
     "Drag",
     "Exposure",
+    "Filter",
     "FitsImage",
     "GaussianPSF",
     "ImagePSF",
     "MoffatPSF",
     "Observation",
+    "Sky",
     "TelescopePSF",
     "count_rate",
     "random_sources",

@@ -294,7 +294,7 @@ class _Reading:
     @property
     def pivot(self) -> float:
         observation = self.observation or Observation()
-        return observation.channel_data.pivot
+        return observation.pivot
 
     def numbers(self, meaning: Meaning, *, required: bool = False) -> Array:
         """Values of a column as plain floats, NaN where there is none."""

@@ -18,6 +18,7 @@ from astropy.table import QTable
 from . import __version__
 from .catalogue import read_catalogue
 from .exposure import Exposure, simulate
+from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .fits_header import psf_description
 from .fits_io import IMAGES
 from .fits_io import SUFFIXES as FITS_SUFFIXES
@@ -28,6 +29,7 @@ from .png import SUFFIXES as PNG_SUFFIXES
 from .rgba import write_rgba
 from .safe_write import check_target
 from .scenes import SCENES, example_scene, load_scene, load_scene_with_notes
+from .sky import SKIES
 
 PROGRAM = "napari-issis"
 SCENE_HELP = (
@@ -99,10 +101,12 @@ def _simulate(words: list[str]) -> None:
     parser.add_argument(
         "--filters",
         nargs=2,
-        choices=FILTERS,
+        choices=FILTER_NAMES,
         metavar=("WHEEL1", "WHEEL2"),
-        help=f"filter in each wheel ({', '.join(FILTERS)}); default: the scene's, or open open",
+        help=f"filter in each wheel: {', '.join(FILTERS)}, or illustrative "
+        f"{', '.join(ILLUSTRATIVE_FILTERS)}; default: the scene's, or open open",
     )
+    parser.add_argument("--sky", choices=SKIES, help="default: the scene's, or CIS")
     parser.add_argument(
         "--exposure", type=float, metavar="SECONDS", help="default: the scene's, or 100"
     )
@@ -152,6 +156,8 @@ def _simulate(words: list[str]) -> None:
     for name in ("channel", "filters", "exposure", "roll"):
         if getattr(options, name) is not None:
             changes[name] = getattr(options, name)
+    if options.sky is not None:
+        changes["sky"] = SKIES[options.sky]
     if options.frame is not None:
         frame = options.frame
         changes["shape"] = (frame[0], frame[0]) if len(frame) == 1 else tuple(frame)
@@ -284,7 +290,7 @@ def _expose(
     light = max(exposure.expected.sum() - sky, 0.0) / observation.exposure
     print(
         f"{len(exposure.sources)} sources, {ny} x {nx} pixels, {observation.channel}, "
-        f"{'-'.join(observation.filters)}, {observation.exposure:g} s, seed {exposure.seed}"
+        f"{'-'.join(observation.filter_names)}, {observation.exposure:g} s, seed {exposure.seed}"
     )
     print(
         f"sources {light:.4g} cps in the frame, brightest pixel {exposure.counts.max()} counts, "

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .counts import checked_seed, poisson_counts
 from .limits import CountRateWarning, count_rate_warnings
-from .observation import OPEN, Observation
+from .observation import Observation
 from .render import render
 
 
@@ -26,7 +26,7 @@ class Exposure:
     counts : ndarray of int64, shape (ny, nx)
         Detected counts; row 0 is drawn at the bottom.
     expected : ndarray of float64, shape (ny, nx)
-        Expected counts, sources and sky.
+        Expected counts: sources, sky and dark rate.
     sources : astropy.table.QTable
         The source table.
     observation : Observation
@@ -46,8 +46,8 @@ class Exposure:
 
     @property
     def background(self) -> float:
-        """Expected sky counts per pixel, B = beta T."""
-        return self.observation.sky_rate * self.observation.exposure
+        """Expected counts per pixel without sources, B = beta T; sky and dark rate."""
+        return self.observation.background_rate * self.observation.exposure
 
     @property
     def snr(self) -> NDArray[np.float64]:
@@ -130,7 +130,9 @@ def simulate(
     observation = Observation() if observation is None else observation
     seed = checked_seed(seed)
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
-    for message in count_rate_warnings(rate, observation.sky_rate):
+    for message in count_rate_warnings(
+        rate, observation.background_rate, sources=sources, observation=observation
+    ):
         warnings.warn(message, CountRateWarning, stacklevel=2)
     return expose(rate, sources, observation, seed=seed, clipped=clipped)
 
@@ -141,21 +143,21 @@ def noise_ready_rate(
     """Count rate of the sources with ripple below zero removed, and the largest one removed.
 
     Accurate enough for drawing counts, see `simulate`. Independent of the exposure time; the
-    neutral filters scale the rate at open-open and render nothing.
+    neutral filters scale the rate without them and render nothing.
     """
-    transmittance = observation.transmittance
+    transmittance = observation.neutral_transmittance
     absolute = None
     if tolerance is None:
         tolerance, absolute = accuracy_for_counts(observation)
     rate = render(
-        sources, observation.replace(filters=OPEN), tolerance=tolerance, absolute=absolute
+        sources, observation.without_neutral_filters(), tolerance=tolerance, absolute=absolute
     )
     lowest = float(rate.min(initial=0.0))
     return np.maximum(rate, 0.0) * transmittance, abs(min(lowest, 0.0)) * transmittance
 
 
 def accuracy_for_counts(observation: Observation) -> tuple[float, float | None]:
-    """Error of the rate at open-open with which counts may be drawn.
+    """Error of the rate without neutral filters with which counts may be drawn.
 
     Returns
     -------
@@ -165,7 +167,7 @@ def accuracy_for_counts(observation: Observation) -> tuple[float, float | None]:
         Largest error in cps per pixel: 1 % of the sky, rounded down to a power of ten, so that
         skies that differ a little share a render.
     """
-    sky = observation.replace(filters=OPEN).sky_rate
+    sky = observation.without_neutral_filters().sky_rate
     if sky <= 0:
         return 1e-8, None
     return 1e-6, float(10.0 ** np.floor(np.log10(0.01 * sky)))
@@ -179,7 +181,7 @@ def expose(
     seed: int = 0,
     clipped: float = 0.0,
 ) -> Exposure:
-    """Add the sky, expose and draw the counts; renders nothing.
+    """Add sky and dark rate, expose and draw the counts; renders nothing.
 
     Parameters
     ----------
@@ -194,7 +196,7 @@ def expose(
     clipped : float
         Largest negative ripple removed from the rate, cps per pixel.
     """
-    expected = (rate + observation.sky_rate) * observation.exposure
+    expected = (rate + observation.background_rate) * observation.exposure
     return Exposure(
         counts=poisson_counts(expected, seed),
         expected=expected,

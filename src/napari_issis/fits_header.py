@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 
 from astropy.io import fits
 
+from .filter_set import FILTER_NOTE, ILLUSTRATIVE_FILTERS
+from .filters import Filter
+from .fits_light_path import sky_description
 from .image_psf import ImagePSF
 from .instrument import PSF_NOTE
 from .observation import Observation
@@ -34,15 +37,20 @@ def observation_header(exposure: Exposure) -> fits.Header:
     header["TELESCOP"] = ("WSO-UV", "telescope")
     header["INSTRUME"] = (observation.instrument, "camera")
     header["CHANNEL"] = (observation.channel, "channel of the camera")
-    header["FILTER1"] = (observation.filters[0], "filter in wheel 1")
-    header["FILTER2"] = (observation.filters[1], "filter in wheel 2")
+    header["FILTER1"] = (observation.filter_names[0], "filter in wheel 1")
+    header["FILTER2"] = (observation.filter_names[1], "filter in wheel 2")
     header["WAVEMIN"] = (low, "[Angstrom] lower end of the band")
     header["WAVEMAX"] = (high, "[Angstrom] upper end of the band")
     header["EXPTIME"] = (observation.exposure, "[s] exposure time")
     header["OBSTYPE"] = ("SIMULATION", "no real observation")
     header["CPSFLUX"] = (observation.cps_per_flux, "[ct/s] for 1 erg/s/cm2/A, with filters")
     header["SKYRATE"] = (observation.sky_rate, "[ct/s/pixel] sky, with filters")
-    header["SKYCOUNT"] = (exposure.background, "[ct/pixel] expected sky in the exposure")
+    header["SKYMODEL"] = sky_description(observation)
+    header["DARKRATE"] = (observation.dark, "[ct/s/pixel] of the detector itself")
+    header["SKYCOUNT"] = (
+        observation.sky_rate * observation.exposure,
+        "[ct/pixel] expected sky in the exposure",
+    )
     header["PIXSCALE"] = (observation.pixel_scale, "[arcsec] size of a pixel")
     header["PSFTYPE"] = (type(psf).__name__, "kind of point spread function")
     header["PSFASSUM"] = (observation.psf_assumed, "T: the PSF is assumed, not measured")
@@ -56,6 +64,9 @@ def observation_header(exposure: Exposure) -> fits.Header:
     )
     if observation.psf_assumed:
         header["COMMENT"] = PSF_NOTE
+    for number, one in enumerate(observation.filters, start=1):
+        if not isinstance(one, Filter) and one in ILLUSTRATIVE_FILTERS:
+            header["COMMENT"] = f"FILTER{number}: {FILTER_NOTE}"
     return header
 
 

@@ -9,7 +9,8 @@ A file holds, in this order,
 * ``SOURCES``, the source table;
 * ``OBSERVATION``, one row with the exact values of the observation, of which the header's
   cards are the readable copy;
-* ``PSF``, where an image serves as the PSF.
+* ``PSF``, where an image serves as the PSF;
+* ``FILTER1``, ``FILTER2``, where a curve of the user's serves as a filter.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 
 from .exposure import Exposure
 from .fits_header import observation_header, wcs_header
+from .fits_light_path import filter_hdus, sky_values, stored_filters, stored_sky
 from .fits_table import open_fits, read_table, table_hdu
 from .image_psf import ImagePSF
 from .observation import Observation
@@ -75,8 +77,8 @@ def write_exposure(
     Raises
     ------
     ValueError
-        If the name does not end as above, the image is not one of these, or a column or the
-        PSF cannot be stored.
+        If the name does not end as above, the image is not one of these, or a column, the
+        PSF or the sky cannot be stored.
     OSError
         If the file cannot be written; `FileExistsError` if it exists.
     """
@@ -107,12 +109,12 @@ def write_exposure(
 def scene_hdus(
     sources: Table, observation: Observation, seed: int, clipped: float = 0.0
 ) -> list[Any]:
-    """Make the extensions from which a scene can be told: sources, observation, seed and PSF.
+    """Make the extensions from which a scene can be told: sources, observation, seed, PSF, filters.
 
     Raises
     ------
     ValueError
-        If a column or the PSF cannot be stored; the message names it.
+        If a column, the PSF or the sky cannot be stored; the message names it.
     """
     record = _record(observation, seed, clipped)
     hdus = [table_hdu(sources, "SOURCES"), table_hdu(record, "OBSERVATION")]
@@ -120,7 +122,7 @@ def scene_hdus(
         psf = observation.psf
         scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
         hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
-    return hdus
+    return hdus + filter_hdus(observation)
 
 
 def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
@@ -239,11 +241,12 @@ def _record(observation: Observation, seed: int, clipped: float) -> Table:
         "LAYOUT": LAYOUT,
         "INSTRUME": observation.instrument,
         "CHANNEL": observation.channel,
-        "FILTER1": observation.filters[0],
-        "FILTER2": observation.filters[1],
+        "FILTER1": observation.filter_names[0],
+        "FILTER2": observation.filter_names[1],
         "EXPOSURE": observation.exposure,
         "NY": observation.shape[0],
         "NX": observation.shape[1],
+        "DARK": observation.dark,
         "BACKGROUND": np.nan if observation.background is None else observation.background,
         "RA": np.nan if pointing is None else float(pointing.ra.deg),
         "DEC": np.nan if pointing is None else float(pointing.dec.deg),
@@ -254,6 +257,7 @@ def _record(observation: Observation, seed: int, clipped: float) -> Table:
         "PSF_ASSUMED": observation.psf_assumed,
         "PSF_TYPE": type(psf).__name__,
         **_psf_values(psf),
+        **sky_values(observation.sky),
     }
     return Table({name: [value] for name, value in values.items()})
 
@@ -266,13 +270,15 @@ def _observation(row: dict[str, Any], hdus: fits.HDUList) -> Observation:
     return Observation(
         instrument=str(row["INSTRUME"]),
         channel=str(row["CHANNEL"]),
-        filters=(str(row["FILTER1"]), str(row["FILTER2"])),
+        filters=stored_filters(row, hdus),
         exposure=float(row["EXPOSURE"]),
         shape=(int(row["NY"]), int(row["NX"])),
         psf=None if row["PSF_ASSUMED"] else _psf(row, hdus),
         background=None if np.isnan(background) else background,
         pointing=pointing,
         roll=float(row["ROLL"]),
+        sky=stored_sky(row),
+        dark=float(row.get("DARK", 0.0)),
     )
 
 

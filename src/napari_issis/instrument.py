@@ -11,6 +11,7 @@ Sources
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log, sqrt
 from types import MappingProxyType
 
 from .psf import TelescopePSF
@@ -30,8 +31,8 @@ PSF_NOTE = (
 
 
 @dataclass(frozen=True)
-class Sky:
-    """Sky background at open-open, count rates in cps per pixel.
+class SkyConstants:
+    """The paper's sky background at open-open, count rates in cps per pixel.
 
     The paper prints the total and the sum of earthshine and zodiacal light; the geocorona is
     the difference of the two.
@@ -56,8 +57,8 @@ class Channel:
         Spectral range in angstrom.
     cps_per_flux : float
         Count rate in cps for 1 erg s-1 cm-2 A-1 at open-open.
-    sky : Sky
-        Background at open-open.
+    sky : SkyConstants
+        The paper's background at open-open.
     psf : TelescopePSF
         The PSF used when an observation names no other one. Assumed, see `PSF_NOTE`.
     """
@@ -65,7 +66,7 @@ class Channel:
     name: str
     band: tuple[float, float]
     cps_per_flux: float
-    sky: Sky
+    sky: SkyConstants
     psf: TelescopePSF
 
     @property
@@ -76,8 +77,6 @@ class Channel:
         (Bessell & Murphy 2012, PASP 124, 140, eq. A15).
         """
         low, high = self.band
-        from math import log, sqrt
-
         return sqrt(0.5 * (high**2 - low**2) / log(high / low))
 
 
@@ -93,7 +92,8 @@ class CountRateLimits:
     total: float = 2e5
 
 
-FILTERS = MappingProxyType({"open": 1.0, "NF1": 0.1, "NF2": 0.01})  # transmittance [P]
+# transmittances of the neutral filters
+FILTERS = MappingProxyType({"open": 1.0, "NF1": 0.1, "NF2": 0.01})  # [P]
 
 CHANNELS = MappingProxyType(
     {
@@ -101,7 +101,7 @@ CHANNELS = MappingProxyType(
             name="FUV",
             band=(1150.0, 1750.0),  # [P]
             cps_per_flux=3.36e15,  # [P]
-            sky=Sky(total=4.9e-3, earthshine_and_zodiacal=7.2e-12),  # [P]
+            sky=SkyConstants(total=4.9e-3, earthshine_and_zodiacal=7.2e-12),  # [P]
             # blur by pointing and detector chosen for about 0.10 arcsec FWHM in all [A]
             psf=TelescopePSF(DIAMETER, OBSCURATION, band=(1150.0, 1750.0), blur_fwhm=0.0945),
         ),
@@ -109,7 +109,7 @@ CHANNELS = MappingProxyType(
             name="NUV",
             band=(1850.0, 3200.0),  # [P]
             cps_per_flux=1.14e17,  # [P]
-            sky=Sky(total=3.5e-4, earthshine_and_zodiacal=2.1e-5),  # [P]
+            sky=SkyConstants(total=3.5e-4, earthshine_and_zodiacal=2.1e-5),  # [P]
             psf=TelescopePSF(DIAMETER, OBSCURATION, band=(1850.0, 3200.0), blur_fwhm=0.0888),
         ),
     }

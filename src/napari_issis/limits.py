@@ -2,25 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import combinations_with_replacement
+from math import prod
+from typing import Any
+
 import numpy as np
+from astropy.table import Table
 from numpy.typing import NDArray
 
-from .instrument import LIMITS
+from .bright_sources import bright_sources
+from .filters import Filter
+from .instrument import FILTERS, LIMITS
+from .observation import OPEN, Observation
+
+# How many sources a warning names.
+NAMED = 3
 
 
 class CountRateWarning(UserWarning):
     """The scene is brighter than a photon-counting detector counts linearly."""
 
 
-def count_rate_warnings(rate: NDArray[np.float64], sky_rate: float) -> list[str]:
+def count_rate_warnings(
+    rate: NDArray[np.float64],
+    background_rate: float,
+    *,
+    sources: Table | None = None,
+    observation: Observation | None = None,
+) -> list[str]:
     """Sentences for each limit that the scene breaks, the last with the cure; none if none.
 
     Parameters
     ----------
     rate : ndarray, shape (ny, nx)
-        Count rate of the sources, cps per pixel.
-    sky_rate : float
-        Sky, cps per pixel.
+        Count rate of the sources, cps per pixel, filters included.
+    background_rate : float
+        Sky and dark rate, cps per pixel, filters included.
+    sources : astropy.table.QTable, optional
+        The source table. With it and ``observation`` the sources that break the local limit
+        are named.
+    observation : Observation, optional
+        The instrument set-up. The cure allows for the filters that it has.
 
     Notes
     -----
@@ -30,13 +53,13 @@ def count_rate_warnings(rate: NDArray[np.float64], sky_rate: float) -> list[str]
     if rate.size == 0:
         return []
     messages = []
-    total = float(rate.sum() + sky_rate * rate.size)
+    total = float(rate.sum() + background_rate * rate.size)
     if total > LIMITS.total:
         messages.append(
             f"The frame receives {total:.3g} cps; a detector such as HST's SBC is linear up to "
             f"{LIMITS.total:.0e} cps."
         )
-    local = rate + sky_rate
+    local = rate + background_rate
     peak = float(local.max())
     if peak > LIMITS.local:
         y, x = np.unravel_index(int(local.argmax()), local.shape)
@@ -46,13 +69,48 @@ def count_rate_warnings(rate: NDArray[np.float64], sky_rate: float) -> list[str]
             f"{pixels} more than {LIMITS.local:g} cps, at most {peak:.3g} cps at x = {x}, "
             f"y = {y}; a detector such as HST's SBC counts linearly below that."
         )
+        if sources is not None and observation is not None:
+            messages[-1] += _names(sources, bright_sources(sources, observation, rate))
     if messages:
-        messages[-1] += f" {_cure(max(total / LIMITS.total, peak / LIMITS.local))}"
+        filters = OPEN if observation is None else observation.filters
+        messages[-1] += f" {_cure(max(total / LIMITS.total, peak / LIMITS.local), filters)}"
     return messages
 
 
-def _cure(excess: float) -> str:
-    for name, factor in (("NF1", 10), ("NF2", 100), ("NF1 and NF2", 1000), ("NF2 twice", 10000)):
-        if excess <= factor:
-            return f"The neutral filter {name} would cure it."
+def _names(sources: Table, rows: NDArray[np.int64]) -> str:
+    if not rows.size:
+        return ""
+    named = [
+        f"{sources['kind'][row]} at x = {_pixels(sources['x'][row]):.1f}, "
+        f"y = {_pixels(sources['y'][row]):.1f} (row {row})"
+        for row in rows[:NAMED]
+    ]
+    more = f" and {rows.size - NAMED} more" if rows.size > NAMED else ""
+    return f" {'Source' if rows.size == 1 else 'Sources'} there: {'; '.join(named)}{more}."
+
+
+def _pixels(value: Any) -> float:
+    return float(getattr(value, "value", value))
+
+
+def _cure(excess: float, filters: tuple[str | Filter, str | Filter]) -> str:
+    """Name the brightest neutral filters that bring the excess to 1 beside the curves."""
+    neutral = [one for one in filters if not isinstance(one, Filter) and one in FILTERS]
+    needed = _passed(neutral) / excess * (1 + 1e-12)
+    present = " and ".join(one for one in neutral if one != "open")
+    instead = f" in place of {present}" if present else ""
+    names = [name for name in FILTERS if name != "open"]
+    choices = [
+        one for n in (1, 2)[: len(neutral)] for one in combinations_with_replacement(names, n)
+    ]
+    # one filter rather than two that pass as much
+    for chosen in sorted(choices, key=lambda one: (-round(_passed(one), 9), len(one))):
+        if _passed(chosen) <= needed:
+            first, *others = chosen
+            text = f"{first} twice" if others == [first] else " and ".join(chosen)
+            return f"The neutral filter {text}{instead} would cure it."
     return "No neutral filter cures it."
+
+
+def _passed(names: Iterable[str]) -> float:
+    return prod(FILTERS[name] for name in names)

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import isfinite
+from types import MappingProxyType
 from typing import Any
 
 import astropy.units as u
 from astropy.coordinates import SkyCoord
 
+from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
+from .filters import Filter
 from .instrument import CHANNELS, FILTERS, PIXEL_SCALE, Channel
+from .passband import Passband
 from .psf import PSF
+from .sky import CIS, SkyModel
 
 INSTRUMENTS = ("ISSIS",)
 OPEN = ("open", "open")
@@ -24,8 +31,9 @@ class Observation:
     ----------
     channel : {"NUV", "FUV"}
         The channel.
-    filters : (str, str)
-        One filter for each of the two wheels: ``open``, ``NF1`` or ``NF2``.
+    filters : (str or Filter, str or Filter)
+        One filter for each of the two wheels: ``open``, a neutral one (``NF1``, ``NF2``), the
+        name of an illustrative curve (see `napari_issis.filter_set`), or a `Filter`.
     exposure : float
         Exposure time, s.
     shape : (int, int)
@@ -33,22 +41,34 @@ class Observation:
     psf : PSF, optional
         Replaces the channel's own, assumed, PSF.
     background : float, optional
-        Sky at open-open in cps per pixel; replaces the channel's own. The filters reduce it.
+        Sky at open-open in cps per pixel; replaces ``sky``. The filters reduce it as a flat
+        spectrum.
     pointing : astropy.coordinates.SkyCoord, optional
         Sky position of the frame's centre.
     roll : float
         Angle from north to the frame's +y axis, counter-clockwise through east, degrees.
     instrument : str
         The instrument's name.
+    sky : SkyModel
+        The sky by components: `napari_issis.sky.CIS`, which holds the paper's constants, or a
+        `napari_issis.sky.Sky`.
+    dark : float
+        Counts of the detector itself, cps per pixel, which no filter reduces. None is
+        published for ISSIS, and the paper has none.
 
     Raises
     ------
     ValueError
-        If a value is unknown or out of range; the message names it.
+        If a value is unknown or out of range, or the filters pass nothing of the channel; the
+        message names it.
+
+    Notes
+    -----
+    Two observations with the same ``background`` are equal whatever their ``sky``.
     """
 
     channel: str = "NUV"
-    filters: tuple[str, str] = OPEN
+    filters: tuple[str | Filter, str | Filter] = OPEN
     exposure: float = 100.0
     shape: tuple[int, int] = (512, 512)
     psf: PSF | None = None
@@ -56,6 +76,8 @@ class Observation:
     pointing: SkyCoord | None = None
     roll: float = 0.0
     instrument: str = "ISSIS"
+    sky: SkyModel = CIS
+    dark: float = 0.0
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -69,9 +91,19 @@ class Observation:
                 'such as ("open", "NF1").'
             )
         set_(self, "filters", tuple(self.filters))
-        for name in self.filters:
-            if name not in tuple(FILTERS):
-                raise ValueError(f"filter is {name!r}; known: {', '.join(FILTERS)}.")
+        for one in self.filters:
+            if not isinstance(one, Filter) and one not in FILTER_NAMES:
+                raise ValueError(
+                    f"filter is {one!r}; known: {', '.join(FILTER_NAMES)}; or give a Filter."
+                )
+        if not self.passband.transmittance > 0:
+            low, high = self.passband.band
+            curves = self.passband.filters
+            names = " and ".join(one.name for one in curves)
+            raise ValueError(
+                f"{names} {'pass' if len(curves) > 1 else 'passes'} nothing of {self.channel}, "
+                f"{low:g} to {high:g} A; choose another filter or channel."
+            )
         set_(self, "exposure", _number("exposure", self.exposure, "seconds", positive=True))
         set_(self, "shape", _shape(self.shape))
         if self.background is not None:
@@ -80,6 +112,9 @@ class Observation:
                 "background",
                 _number("background", self.background, "cps per pixel", positive=False),
             )
+        set_(self, "dark", _number("dark", self.dark, "cps per pixel", positive=False))
+        if not isinstance(self.sky, SkyModel):
+            raise ValueError(f"sky is {self.sky!r}; give a Sky, or one of SKIES by its key.")
         try:
             roll = float(u.Quantity(self.roll, u.deg).value)
         except (TypeError, ValueError):
@@ -108,26 +143,82 @@ class Observation:
         return CHANNELS[self.channel]
 
     @property
-    def transmittance(self) -> float:
-        """Product of the two filters' transmittances."""
+    def filter_names(self) -> tuple[str, str]:
+        """Names of the two filters."""
         first, second = self.filters
-        return FILTERS[first] * FILTERS[second]
+        return str(first), str(second)
+
+    @property
+    def neutral_transmittance(self) -> float:
+        """Product of the neutral filters' transmittances; rates and sky scale with it."""
+        first, second = (
+            1.0 if isinstance(one, Filter) else FILTERS.get(one, 1.0) for one in self.filters
+        )
+        return first * second
+
+    def without_neutral_filters(self) -> Observation:
+        """Return a copy with the neutral filters out of the light path."""
+        return self.replace(
+            filters=tuple(
+                "open" if not isinstance(one, Filter) and one in FILTERS else one
+                for one in self.filters
+            )
+        )
+
+    @property
+    def passband(self) -> Passband:
+        """The channel's response behind the filters that are curves."""
+        curves = tuple(
+            one if isinstance(one, Filter) else ILLUSTRATIVE_FILTERS[one]
+            for one in self.filters
+            if isinstance(one, Filter) or one in ILLUSTRATIVE_FILTERS
+        )
+        return _passband(self.channel, curves)
+
+    @property
+    def transmittance(self) -> float:
+        """Share of a flat spectrum's counts that the two filters pass."""
+        return self.neutral_transmittance * self.passband.transmittance
 
     @property
     def cps_per_flux(self) -> float:
-        """Count rate in cps of 1 erg s-1 cm-2 A-1, filters included."""
+        """Count rate in cps of a flat spectrum of 1 erg s-1 cm-2 A-1, filters included."""
         return self.channel_data.cps_per_flux * self.transmittance
+
+    @property
+    def pivot(self) -> float:
+        """Pivot wavelength of the channel behind the filters, angstrom."""
+        return self.passband.pivot if self.passband.filters else self.channel_data.pivot
 
     @property
     def sky_rate(self) -> float:
         """Sky background in cps per pixel, filters included."""
-        sky = self.channel_data.sky.total if self.background is None else self.background
-        return sky * self.transmittance
+        if self.background is not None:
+            return self.background * self.transmittance
+        rate, _ = _sky(self.sky, self.channel, self.passband)
+        return rate * self.neutral_transmittance
+
+    @property
+    def background_rate(self) -> float:
+        """Sky and dark rate together, cps per pixel."""
+        return self.sky_rate + self.dark
+
+    @property
+    def sky_components(self) -> Mapping[str, float]:
+        """Sky background in cps per pixel, filters included, by the component's name."""
+        if self.background is not None:
+            return MappingProxyType({"background": self.sky_rate})
+        _, components = _sky(self.sky, self.channel, self.passband)
+        passed = self.neutral_transmittance
+        return MappingProxyType({name: rate * passed for name, rate in components.items()})
 
     @property
     def effective_psf(self) -> PSF:
-        """The PSF in use: the given one or the channel's own."""
-        return self.channel_data.psf if self.psf is None else self.psf
+        """The PSF in use: the given one, or the channel's own in the band that is passed."""
+        if self.psf is not None:
+            return self.psf
+        own = self.channel_data.psf
+        return replace(own, band=self.passband.equivalent_band) if self.passband.filters else own
 
     @property
     def psf_assumed(self) -> bool:
@@ -150,6 +241,8 @@ class Observation:
             self.shape,
             self.psf,
             self.background,
+            self.sky if self.background is None else None,
+            self.dark,
             position,
             self.roll,
             self.instrument,
@@ -160,6 +253,18 @@ class Observation:
 
     def __hash__(self) -> int:
         return hash(self._key())
+
+
+@lru_cache(maxsize=64)
+def _passband(channel: str, curves: tuple[Filter, ...]) -> Passband:
+    data = CHANNELS[channel]
+    return Passband(data.band, data.cps_per_flux, curves)
+
+
+@lru_cache(maxsize=64)
+def _sky(sky: SkyModel, channel: str, passband: Passband) -> tuple[float, Mapping[str, float]]:
+    data = CHANNELS[channel]
+    return sky.rate(data, passband), sky.components(data, passband)
 
 
 def _number(name: str, value: Any, unit: str, *, positive: bool) -> float:

@@ -52,7 +52,7 @@ def signal_to_noise(sources: Table, observation: Observation) -> Array:
     counts = expected_counts(sources, observation)
     optics = Optics(observation.effective_psf, observation.pixel_scale)
     area = noise_areas(optics, arrays)
-    sky = observation.sky_rate * observation.exposure
+    sky = observation.background_rate * observation.exposure
     noise = np.sqrt(counts + area * sky)
     return np.divide(counts, noise, out=np.zeros_like(counts), where=noise > 0)
 
@@ -97,6 +97,4 @@ def _weights(optics: Optics) -> tuple[Array, Array]:
 
 
 def _arrays(sources: Table, observation: Observation) -> SourceArrays:
-    return check_sources(
-        sources, pivot=observation.channel_data.pivot, pixel_scale=observation.pixel_scale
-    )
+    return check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)

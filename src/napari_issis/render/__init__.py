@@ -107,9 +107,7 @@ def render(
 
 def arrays_and_rates(sources: Table, observation: Observation) -> tuple[SourceArrays, Array]:
     """Return the sources that are not dark, and their count rates after the filters."""
-    arrays = check_sources(
-        sources, pivot=observation.channel_data.pivot, pixel_scale=observation.pixel_scale
-    )
+    arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
     rate = arrays.flux * observation.cps_per_flux
     bright = rate > 0
     return arrays.take(bright), rate[bright]

@@ -1,0 +1,178 @@
+"""Fill the tables of instrument.md from the program: python docs/instrument_tables.py."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import napari_issis as ni
+from napari_issis.encircled_energy import encircled_energy
+from napari_issis.filter_set import ILLUSTRATIVE_FILTERS
+from napari_issis.instrument import CHANNELS, DIAMETER, FILTERS, LIMITS, OBSCURATION, PIXEL_SCALE
+from napari_issis.psf import fwhm
+from napari_issis.sky import SKIES, paper_estimate
+from napari_issis.sky_tables import EARTHSHINE, LINES, ZODIACAL
+
+PAGE = Path(__file__).with_name("instrument.md")
+Rows = list[list[str]]
+CIRCLES = (0.1, 0.2, 0.5, 1.0)
+
+
+def channels() -> Rows:
+    """Channels, their effective area and pivot wavelength."""
+    rows = [["quantity", *CHANNELS, "status"]]
+    bands = [ni.Observation(name).passband for name in CHANNELS]
+    for label, values, status in (
+        ("band (A)", ["{:g} to {:g}".format(*b.band) for b in bands], "paper"),
+        ("cps for 1 erg s-1 cm-2 A-1", [f"{b.cps_per_flux:.3g}" for b in bands], "paper"),
+        ("mean effective area (cm2)", [f"{b.area:.1f}" for b in bands], "derived"),
+        ("its shape over the band", ["constant"] * 2, "assumed"),
+        ("pivot wavelength (A)", [f"{c.pivot:.1f}" for c in CHANNELS.values()], "derived"),
+        (
+            "AB magnitude of 1 cps",
+            [f"{_magnitude(name):.2f}" for name in CHANNELS],
+            "derived",
+        ),
+        ("pixel (arcsec)", [f"{PIXEL_SCALE}"] * 2, "paper"),
+    ):
+        rows.append([label, *values, status])
+    return rows
+
+
+def psfs() -> Rows:
+    """Width and encircled energy of the two assumed PSFs."""
+    rows = [["channel", "FWHM (arcsec)", *(f"in {d:g} arcsec" for d in CIRCLES), "status"]]
+    for name, channel in CHANNELS.items():
+        shares = [f"{100 * encircled_energy(channel.psf, d):.0f} %" for d in CIRCLES]
+        rows.append([name, f"{fwhm(channel.psf):.3f}", *shares, "assumed"])
+    return rows
+
+
+def skies() -> Rows:
+    """Rates of each component in each of the named skies, cps per pixel."""
+    rows = [["channel", "component", *SKIES]]
+    for channel in CHANNELS:
+        seen = [ni.Observation(channel, sky=sky) for sky in SKIES.values()]
+        names = dict.fromkeys(name for one in seen for name in one.sky_components)
+        for name in names:
+            rates = [one.sky_components.get(name) for one in seen]
+            rows.append([channel, name, *("" if r is None else f"{r:.2g}" for r in rates)])
+        rows.append([channel, "**all**", *(f"**{one.sky_rate:.2g}**" for one in seen)])
+    return rows
+
+
+def paper_sky() -> Rows:
+    """Compare the paper's two numbers, how they come about, and the integral over the band."""
+    rows = [["channel", "part", "paper", "its way, here", "integrated", "integrated / paper"]]
+    for name, channel in CHANNELS.items():
+        observation = ni.Observation(name, sky=ni.Sky("average", "average", "high"))
+        parts = observation.sky_components
+        continuum = parts["earthshine"] + parts["zodiacal light"]
+        estimate = paper_estimate(channel)
+        for part, paper, ours, integrated in (
+            (
+                "earthshine and zodiacal light",
+                channel.sky.earthshine_and_zodiacal,
+                estimate["earthshine and zodiacal light"],
+                continuum,
+            ),
+            ("all", channel.sky.total, sum(estimate.values()), observation.sky_rate),
+        ):
+            rows.append(
+                [
+                    *(name, part, f"{paper:.2g}", f"{ours:.3g}", f"{integrated:.3g}"),
+                    f"{integrated / paper:.3g}",
+                ]
+            )
+    return rows
+
+
+def levels() -> Rows:
+    """Levels of the continuum."""
+    rows = [["component", "level", "share of the high one", "status"]]
+    for component, shares in (("earthshine", EARTHSHINE), ("zodiacal", ZODIACAL)):
+        for level, share in shares.items():
+            status = "derived" if level == "high orbit" else "handbook"
+            rows.append([component, level, f"{share:.3g}", status])
+    return rows
+
+
+def lines() -> Rows:
+    """Surface brightness of the geocoronal lines."""
+    rows = [["line", "A", "high orbit", "low", "average", "high"]]
+    for one in LINES:
+        fluxes = (one.high_orbit, one.low, one.average, one.high)
+        rows.append([one.name, f"{one.wavelength:g}", *(f"{flux:.3g}" for flux in fluxes)])
+    return rows
+
+
+def filters() -> Rows:
+    """List what each filter passes of a flat spectrum and of the sky."""
+    rows = [["filter", "channel", "flat spectrum", "pivot (A)", "CIS sky (cps/px)", "status"]]
+    for name in (*FILTERS, *ILLUSTRATIVE_FILTERS):
+        status = "paper" if name in FILTERS else "illustrative"
+        for channel in CHANNELS:
+            if name in ILLUSTRATIVE_FILTERS and channel != _made_for(name):
+                continue
+            one = ni.Observation(channel, (name, "open"))
+            rows.append(
+                [
+                    *(name, channel, f"{one.transmittance:.3g}", f"{one.pivot:.0f}"),
+                    *(f"{one.sky_rate:.2g}", status),
+                ]
+            )
+    return rows
+
+
+def detector() -> Rows:
+    """Limits of a photon-counting detector."""
+    return [
+        ["quantity", "value", "status"],
+        ["local count-rate limit (cps per pixel)", f"{LIMITS.local:g}", "HST ACS/SBC"],
+        ["global count-rate limit (cps)", f"{LIMITS.total:g}", "HST ACS/SBC"],
+        ["dark rate (cps per pixel)", f"{ni.Observation().dark:g}", "paper"],
+        ["clear aperture (m)", f"{DIAMETER:g}", "published"],
+        ["linear obscuration", f"{OBSCURATION:g}", "assumed"],
+    ]
+
+
+TABLES: dict[str, Callable[[], Rows]] = {
+    "channels": channels,
+    "psf": psfs,
+    "skies": skies,
+    "paper": paper_sky,
+    "levels": levels,
+    "lines": lines,
+    "filters": filters,
+    "detector": detector,
+}
+
+
+def filled(page: str) -> str:
+    """Return the page with all its tables made anew."""
+
+    def table(match: re.Match[str]) -> str:
+        head, *body = TABLES[match[1]]()
+        text = [head, ["---"] * len(head), *body]
+        made = "\n".join(f"| {' | '.join(row)} |" for row in text)
+        return f"<!-- table: {match[1]} -->\n{made}\n<!-- end -->"
+
+    return re.sub(r"<!-- table: (\w+) -->\n.*?<!-- end -->", table, page, flags=re.DOTALL)
+
+
+def _made_for(name: str) -> str:
+    """Channel of an illustrative filter: that of its wavelength."""
+    wavelength = float(name.strip("NLP"))
+    return next(c for c, data in CHANNELS.items() if data.band[0] <= wavelength <= data.band[1])
+
+
+def _magnitude(channel: str) -> float:
+    from napari_issis.photometry import ab_magnitude
+
+    observation = ni.Observation(channel)
+    return float(ab_magnitude(1 / observation.cps_per_flux, observation.pivot))
+
+
+if __name__ == "__main__":
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
