@@ -22,7 +22,9 @@ from qtpy.QtWidgets import (
 
 from .display_form import DisplayForm
 from .instrument_form import InstrumentForm
+from .keys import show_keys
 from .panels import LIST_NAME, toggle_panel
+from .progress_row import ProgressRow
 from .scene import open_scene
 from .source_form import SourceForm
 from .source_list import SourceList
@@ -56,9 +58,11 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         tools.setContentsMargins(4, 0, 4, 0)
         self.undo = _tool("&Undo", self.scene.undo)
         self.redo = _tool("&Redo", self.scene.redo)
-        self.list = _tool("Sources…", self.toggle_list)
+        self.list = _tool("S&ources…", self.toggle_list)
         self.list.setToolTip("Show or hide the list of sources")
-        for button in (self.undo, self.redo, self.list):
+        self.keys = _tool("Ke&ys", lambda: show_keys(self))
+        self.keys.setToolTip("List the keys")
+        for button in (self.undo, self.redo, self.list, self.keys):
             tools.addWidget(button)
         for keys, action in (
             (QKeySequence.StandardKey.Undo, self.scene.undo),
@@ -77,6 +81,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 4)
         layout.addWidget(self.pages)
+        self.progress = ProgressRow(self.scene)
+        layout.addWidget(self.progress)
         buttons = QHBoxLayout()
         buttons.setContentsMargins(4, 0, 4, 0)
         buttons.addWidget(self.sources.button.native)
@@ -131,6 +137,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.show_steps()
             self.display.resume()
             self.view.resume()
+            self.progress.resume()
         super().showEvent(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -142,6 +149,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.scene.events.picture.disconnect(self.show_steps)
             self.display.pause()
             self.view.pause()
+            self.progress.pause()
         super().hideEvent(event)
 
 

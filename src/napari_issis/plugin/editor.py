@@ -80,6 +80,7 @@ class SourceEditor:
         self._untidy = False
         self._born: set[int] = set()
         self._writing = False
+        self._nudging = False
         self.history = History(self._state())
 
     @property
@@ -116,10 +117,12 @@ class SourceEditor:
 
     def undo(self) -> bool:
         """Take the last edit back; False if there is none, or while the mouse holds a source."""
+        self.end_nudge()
         return self.held is None and self._restore(self.history.undo())
 
     def redo(self) -> bool:
         """Do again what was undone; False if there is nothing."""
+        self.end_nudge()
         return self.held is None and self._restore(self.history.redo())
 
     def _restore(self, state: SourceState | None) -> bool:
@@ -130,7 +133,35 @@ class SourceEditor:
         self._set(state.sources, state.source_id)
         return True
 
+    def nudge(self, dx: float, dy: float) -> bool:
+        """Move the selected sources; until `end_nudge` all moves are one step of the history.
+
+        The sources are held meanwhile as by the mouse. False if none is selected, or while the
+        mouse holds one.
+        """
+        moving = np.isin(self.source_id, list(self.selected_ids))
+        if not moving.any() or (self.held is not None and not self._nudging):
+            return False
+        if not self._nudging:
+            self._nudging = True
+            ids = frozenset(self.source_id[moving].tolist())
+            self.held = HeldSources(self.sources, self.source_id, ids)
+        table = self.sources.copy()
+        table["x"][moving] += dx
+        table["y"][moving] += dy
+        self.sources = table
+        self.version += 1
+        self.write()
+        return True
+
+    def end_nudge(self) -> None:
+        """Let go of the sources that keys have moved."""
+        if self._nudging:
+            self._nudging, self.held, self._untidy = False, None, True
+            self.take_over()
+
     def _set(self, table: QTable, source_id: Ids) -> None:
+        self.end_nudge()
         self.held = None
         self._born.clear()
         self.sources, self.source_id = table, source_id
@@ -216,6 +247,7 @@ class SourceEditor:
             return
         action = str(getattr(event.action, "value", event.action))
         view = self.points if event.source is self.points.layer else self.ellipses
+        self.end_nudge()
         if action in ("changing", "adding"):
             self.take_over()
             moving: list[int] = []

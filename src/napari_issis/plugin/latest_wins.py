@@ -32,6 +32,7 @@ class LatestWins:
         self._fail = fail
         self._waiting: Callable[[], Any] | None = None
         self._running = False
+        self._unwanted = False
         self._letter = _Letter()
         self._letter.sent.connect(self._ended)
 
@@ -49,6 +50,11 @@ class LatestWins:
         """Forget the job that waits."""
         self._waiting = None
 
+    def cancel(self) -> None:
+        """Forget the job that waits, and the result of the one that runs (on to its end)."""
+        self._waiting = None
+        self._unwanted = self._running
+
     def _start(self) -> None:
         if self._running or self._waiting is None:
             return
@@ -58,7 +64,10 @@ class LatestWins:
 
     def _ended(self, result: Any, error: BaseException | None) -> None:
         self._running = False
+        unwanted, self._unwanted = self._unwanted, False
         try:
+            if unwanted:
+                return
             if error is None:
                 self._deliver(result)
             else:
