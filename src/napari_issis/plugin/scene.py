@@ -217,13 +217,14 @@ class Scene:
         """
         if self._jobs.busy:
             self._jobs.cancel()
-            self._cancelled = self._version
+            self._cancelled, self._requested = self._version, (None, False)
             self._watch()
 
     def simulate(self) -> None:
         """Simulate the scene after all, if that was cancelled."""
         if self.cancelled:
             self._cancelled = None
+            self.events.progress()
             self._soon()
 
     def new_noise(self) -> None:
@@ -312,7 +313,7 @@ class Scene:
             If the picture could not be made; the cause is chained.
         """
         self.show_layers()
-        self._cancelled = None
+        self.simulate()
         self._refresh()
         until = time.monotonic() + timeout
         while not self.settled:
@@ -469,8 +470,9 @@ class Scene:
 
     def _request_final(self) -> None:
         ticket = (self._version, True)
-        if self._requested == ticket and (
-            self._jobs.busy or self._shown == ticket or self._error is not None or self.cancelled
+        asked = self._requested == ticket
+        if self.cancelled or (
+            asked and (self._jobs.busy or self._shown == ticket or self._error is not None)
         ):
             return
         maker = self._maker
