@@ -40,6 +40,7 @@ BURST = 600
 # Arrow keys: a pixel to the right and up; with Shift a part of it.
 ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Down": (0, -1), "Up": (0, 1)}
 FINE_STEP = 0.1
+DELETE_KEYS = ("Delete", "Backspace")
 # Row 0 at the bottom and x to the right, as astronomers expect.
 ORIENTATION = ("up", "right")
 
@@ -391,7 +392,14 @@ class Scene:
         """Bind our keys on a layer of ours: those of the viewer belong to the user."""
         layer.bind_key("Control-Z", self.undo, overwrite=True)
         layer.bind_key("Control-Shift-Z", self.redo, overwrite=True)
+        for key in DELETE_KEYS:
+            layer.bind_key(key, self._remove_selected, overwrite=True)
         self._bind_arrows(layer)
+
+    def _remove_selected(self, layer: Any) -> None:
+        """Remove what is selected on either layer; napari would on the active one alone."""
+        if not getattr(layer, "_is_creating", False):
+            self.remove(self.editor.selected_ids)
 
     def _bind_arrows(self, layer: Any) -> None:
         """Let the arrow keys move the selected sources; without any they are napari's."""
