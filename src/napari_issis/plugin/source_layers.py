@@ -107,6 +107,13 @@ class SourceLayer:
         ids = pd.to_numeric(table["source_id"], errors="coerce").fillna(-1)
         return np.array(ids, dtype=np.int64)
 
+    def selected_ids(self) -> Ids:
+        """Ids of the selected rows."""
+        if self.layer is None:
+            return np.empty(0, dtype=np.int64)
+        current = self.current_ids()
+        return current[[row for row in self.layer.selected_data if row < current.size]]
+
     def write(self, table: QTable, source_id: Ids) -> None:
         """Show the rows of the table that belong here."""
         mine = self.holds(table["kind"])
