@@ -15,6 +15,7 @@ from qtpy.QtWidgets import (
     QHBoxLayout,
     QPushButton,
     QScrollArea,
+    QSizePolicy,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -68,6 +69,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.keys = _tool("Ke&ys", lambda: show_keys(self))
         self.keys.setToolTip("List the keys")
         for button in (self.undo, self.redo, self.list, self.png, self.keys):
+            button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
             tools.addWidget(button)
         for keys, action in (
             (QKeySequence.StandardKey.Undo, self.scene.undo),

@@ -115,13 +115,11 @@ class SourceLayer:
         return current[[row for row in self.layer.selected_data if row < current.size]]
 
     def write(self, table: QTable, source_id: Ids) -> None:
-        """Show the rows of the table that belong here."""
+        """Show the rows of the table that belong here, if there is a layer."""
+        if self.layer is None:
+            return
         mine = self.holds(table["kind"])
         part, ids = table[mine], source_id[mine]
-        if self.layer is None:
-            if len(part) == 0:
-                return
-            self.layer = self.make()
         selected = set(self.current_ids()[list(self.layer.selected_data)])
         self.replace(self.geometry(part), part)
         self.layer.features = features(part, ids)
