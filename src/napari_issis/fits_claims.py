@@ -22,7 +22,7 @@ MOST_CARDS = 36_000
 MOST_EXTENSIONS = 500
 # As the standard has it; of columns too.
 MOST_AXES = 999
-_COUNT = re.compile(rb"(Z?NAXIS|TFIELDS) *= *(\d+)", re.IGNORECASE)
+_COUNT = re.compile(rb"(Z?NAXIS|TFIELDS|WCSAXES[A-Z]?) *= *(\d+)", re.IGNORECASE)
 # Bytes that one byte can stand for: in a deflate stream, and in a Rice-compressed one, where 32
 # equal pixels of 4 bytes take 6 bits.
 DENSEST_GZIP, DENSEST_RICE = 1032, 171
