@@ -95,6 +95,21 @@ FITS = {
         header(SIMPLE, card("BITPIX", 8), card("NAXIS", 10**9)),
         "NAXIS is 1000000000 in a header",
     ),
+    "a matrix of a billion coordinates": (
+        header(
+            *(SIMPLE, card("BITPIX", 8), card("NAXIS", 2), card("NAXIS1", 1), card("NAXIS2", 1)),
+            *(card("CTYPE1", "'RA---TAN'"), card("CTYPE2", "'DEC--TAN'"), card("WCSAXES", 32768)),
+        )
+        + bytes(2880),
+        "WCSAXES is 32768 in a header",
+    ),
+    "a size that is text": (
+        header(
+            *(SIMPLE, card("BITPIX", 8), card("NAXIS", 1), card("NAXIS1", 10**15)),
+            *(card("PCOUNT", 0), card("GCOUNT", "'x'")),
+        ),
+        "GCOUNT is text in a header",
+    ),
     "axes below zero": (
         header(SIMPLE, card("BITPIX", 8), card("NAXIS", 2), card("NAXIS1", -9), card("NAXIS2", -9)),
         "negative|impossible",

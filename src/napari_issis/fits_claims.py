@@ -22,7 +22,9 @@ MOST_CARDS = 36_000
 MOST_EXTENSIONS = 500
 # As the standard has it; of columns too.
 MOST_AXES = 999
-_COUNT = re.compile(rb"(Z?NAXIS|TFIELDS) *= *(\d+)", re.IGNORECASE)
+_COUNT = re.compile(rb"(Z?NAXIS|TFIELDS|WCSAXES[A-Z]?) *= *(\d+)", re.IGNORECASE)
+# Python multiplies text by repeating it.
+_TEXT = re.compile(rb"(BITPIX|[PG]COUNT|NAXIS\d*) *= *'", re.IGNORECASE)
 # Bytes that one byte can stand for: in a deflate stream, and in a Rice-compressed one, where 32
 # equal pixels of 4 bytes take 6 bits.
 DENSEST_GZIP, DENSEST_RICE = 1032, 171
@@ -67,7 +69,8 @@ def check_claims(file: BinaryIO, size: int) -> None:
 def _count_cards(file: BinaryIO, start: int, before: int) -> int:
     """Find the end of the header that starts here, and add its cards to those before it.
 
-    Astropy loops over as many axes and columns as a header claims: it must not see those yet.
+    Astropy loops over as many axes and columns as a header claims, and multiplies what stands
+    for a size: it must not see such cards.
     """
     position = file.tell()
     file.seek(start)
@@ -80,6 +83,9 @@ def _count_cards(file: BinaryIO, start: int, before: int) -> int:
             if card == END:
                 file.seek(position)
                 return cards
+            text = _TEXT.match(card)
+            if text:
+                raise ValueError(f"{text[1].decode()} is text in a header, not a whole number.")
             number = _COUNT.match(card)
             if number and int(number[2]) > MOST_AXES:
                 name, value = number[1].decode(), number[2].decode()
