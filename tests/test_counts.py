@@ -337,3 +337,23 @@ def test_bad_shapes():
         poisson_counts(np.ones(3), 0)
     with pytest.raises(ValueError, match=r"previous has the shapes \(2, 3\) and \(3, 2\)"):
         poisson_counts(np.ones((2, 3)), 0, previous=(np.ones((2, 3)), np.ones((3, 2), np.int64)))
+
+
+def test_only_the_windows_are_looked_at():
+    """Catches windows that are ignored, and pixels of a window that keep their old counts."""
+    rng = np.random.default_rng(3)
+    before = rng.uniform(0, 50, (40, 50))
+    counts = poisson_counts(before, 5)
+    expected = before.copy()
+    expected[3:20, 10:30] += rng.uniform(0, 5, (17, 20))
+    expected[15:35, 25:45] *= 2
+    windows = [(slice(3, 20), slice(10, 30)), (slice(15, 35), slice(25, 45))]
+    drawn = poisson_counts(expected, 5, previous=(before, counts), windows=windows)
+    assert np.array_equal(drawn, poisson_counts(expected, 5))
+    first = poisson_counts(expected, 5, previous=(before, counts), windows=windows[:1])
+    outside = np.ones(counts.shape, dtype=bool)
+    outside[windows[0]] = False
+    assert np.array_equal(first[outside], counts[outside])
+    expected[17, 28] = -1
+    with pytest.raises(ValueError, match=r"pixel \[17, 28\]"):
+        poisson_counts(expected, 5, previous=(before, counts), windows=windows)

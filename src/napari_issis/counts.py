@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from numbers import Integral
 from typing import Any
@@ -20,6 +21,7 @@ def poisson_counts(
     seed: int,
     *,
     previous: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None,
+    windows: Sequence[tuple[slice, slice]] | None = None,
 ) -> NDArray[np.int64]:
     """Draw Poisson counts.
 
@@ -36,6 +38,9 @@ def poisson_counts(
     previous : (ndarray, ndarray), optional
         Expected counts and counts of an earlier call with the same seed and shape. Only the
         pixels whose expected counts differ are drawn; the result is the same.
+    windows : sequence of (slice, slice), optional
+        Parts of the frame outside of which nothing differs from ``previous``: only they are
+        looked at.
 
     Returns
     -------
@@ -54,7 +59,9 @@ def poisson_counts(
         raise ValueError(
             f"expected has {expected.ndim} dimensions; give an image of shape (ny, nx)."
         )
-    _check_range(expected)
+    whole = (slice(None), slice(None))
+    parts = [whole] if previous is None or windows is None else list(windows)
+    _check_range(expected, parts)
     u, z = _uniforms_and_normals(checked_seed(seed), expected.shape)
     if previous is None:
         return poisson_quantile(u.ravel(), expected.ravel(), z.ravel()).reshape(expected.shape)
@@ -64,9 +71,11 @@ def poisson_counts(
             f"previous has the shapes {before.shape} and {counts_before.shape}; both must be "
             f"that of expected, {expected.shape}."
         )
-    changed = expected != before
     counts = counts_before.astype(np.int64)
-    counts[changed] = poisson_quantile(u[changed], expected[changed], z[changed])
+    for part in parts:
+        changed = expected[part] != before[part]
+        drawn = poisson_quantile(u[part][changed], expected[part][changed], z[part][changed])
+        counts[part][changed] = drawn
     return counts
 
 
@@ -124,8 +133,11 @@ def checked_seed(seed: Any) -> int:
     return int(seed)
 
 
-def _check_range(expected: NDArray[np.float64]) -> None:
-    if expected.size == 0 or (expected.min() >= 0 and expected.max() <= MAX_EXPECTED):
+def _check_range(expected: NDArray[np.float64], parts: Sequence[tuple[slice, slice]]) -> None:
+    if all(
+        part.size == 0 or (part.min() >= 0 and part.max() <= MAX_EXPECTED)
+        for part in (expected[window] for window in parts)
+    ):
         return
     y, x = np.argwhere(~((expected >= 0) & (expected <= MAX_EXPECTED)))[0]
     value = float(expected[y, x])

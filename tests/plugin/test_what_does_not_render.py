@@ -150,7 +150,8 @@ def test_a_drag_transforms_what_moves_alone(held, renders, monkeypatch):
     for x in (103.5, 107.25, 300.0):
         held(x)
     assert renders == []
-    assert len(transforms) == 3
+    # one along each axis
+    assert len(transforms) == 6
     assert max(args[0].size for args in transforms) < 512 * 512
 
 
@@ -159,13 +160,13 @@ def test_a_drag_draws_counts_only_where_light_changes(held, monkeypatch):
     before = held(102.0).exposure
     drawn.clear()
     after = held(103.5).exposure
-    (args,) = drawn
     changed = np.count_nonzero(after.expected != before.expected)
-    assert args[1].size == changed
+    # the windows where the source was and where it is overlap
+    assert changed <= sum(args[1].size for args in drawn) <= 2 * changed
     assert 0 < changed < 0.5 * after.counts.size
     drawn.clear()
     again = held(103.5).exposure
-    assert [args[1].size for args in drawn] == [0]
+    assert {args[1].size for args in drawn} == {0}
     assert np.array_equal(again.counts, after.counts)
 
 

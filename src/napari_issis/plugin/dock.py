@@ -23,8 +23,10 @@ from qtpy.QtWidgets import (
 from .crash_guard import CrashGuard
 from .display_form import DisplayForm
 from .instrument_form import InstrumentForm
+from .keys import show_keys
 from .panels import LIST_NAME, toggle_panel
 from .png_menu import PngMenu
+from .progress_row import ProgressRow
 from .scene import open_scene
 from .source_form import SourceForm
 from .source_list import SourceList
@@ -58,12 +60,14 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         tools.setContentsMargins(4, 0, 4, 0)
         self.undo = _tool("&Undo", self.scene.undo)
         self.redo = _tool("&Redo", self.scene.redo)
-        self.list = _tool("Sources…", self.toggle_list)
+        self.list = _tool("S&ources…", self.toggle_list)
         self.list.setToolTip("Show or hide the list of sources")
         self.png = QPushButton("PNG")
         self.png.setToolTip("Save the final image, the source model or RGBA data as a picture")
         self.png.setMenu(PngMenu(self.scene, self))
-        for button in (self.undo, self.redo, self.list, self.png):
+        self.keys = _tool("Ke&ys", lambda: show_keys(self))
+        self.keys.setToolTip("List the keys")
+        for button in (self.undo, self.redo, self.list, self.png, self.keys):
             tools.addWidget(button)
         for keys, action in (
             (QKeySequence.StandardKey.Undo, self.scene.undo),
@@ -84,6 +88,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.guard = CrashGuard(self.scene)
         layout.addWidget(self.guard)
         layout.addWidget(self.pages)
+        self.progress = ProgressRow(self.scene)
+        layout.addWidget(self.progress)
         buttons = QHBoxLayout()
         buttons.setContentsMargins(4, 0, 4, 0)
         buttons.addWidget(self.sources.button.native)
@@ -138,6 +144,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.show_steps()
             self.display.resume()
             self.view.resume()
+            self.progress.resume()
         super().showEvent(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -149,6 +156,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.scene.events.picture.disconnect(self.show_steps)
             self.display.pause()
             self.view.pause()
+            self.progress.pause()
         super().hideEvent(event)
 
 

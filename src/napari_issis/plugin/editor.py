@@ -11,6 +11,7 @@ from astropy.table import QTable
 from napari.utils.notifications import show_error, show_warning
 from numpy.typing import NDArray
 
+from ..exposure import same_table
 from ..sources import (
     DEFAULT_ELLIPTICITY,
     DEFAULT_FLUX,
@@ -80,6 +81,9 @@ class SourceEditor:
         self._untidy = False
         self._born: set[int] = set()
         self._writing = False
+        self._nudging = False
+        # The source that a drag moves, and those on the other layer that go with it.
+        self._along: tuple[int, set[int]] | None = None
         self.history = History(self._state())
 
     @property
@@ -116,10 +120,12 @@ class SourceEditor:
 
     def undo(self) -> bool:
         """Take the last edit back; False if there is none, or while the mouse holds a source."""
+        self.end_nudge()
         return self.held is None and self._restore(self.history.undo())
 
     def redo(self) -> bool:
         """Do again what was undone; False if there is nothing."""
+        self.end_nudge()
         return self.held is None and self._restore(self.history.redo())
 
     def _restore(self, state: SourceState | None) -> bool:
@@ -130,7 +136,35 @@ class SourceEditor:
         self._set(state.sources, state.source_id)
         return True
 
+    def nudge(self, dx: float, dy: float) -> bool:
+        """Move the selected sources; until `end_nudge` all moves are one step of the history.
+
+        The sources are held meanwhile as by the mouse. False if none is selected, or while the
+        mouse holds one.
+        """
+        moving = np.isin(self.source_id, list(self.selected_ids))
+        if not moving.any() or (self.held is not None and not self._nudging):
+            return False
+        if not self._nudging:
+            self._nudging = True
+            ids = frozenset(self.source_id[moving].tolist())
+            self.held = HeldSources(self.sources, self.source_id, ids)
+        table = self.sources.copy()
+        table["x"][moving] += dx
+        table["y"][moving] += dy
+        self.sources = table
+        self.version += 1
+        self.write()
+        return True
+
+    def end_nudge(self) -> None:
+        """Let go of the sources that keys have moved."""
+        if self._nudging:
+            self._nudging, self.held, self._untidy = False, None, True
+            self.take_over()
+
     def _set(self, table: QTable, source_id: Ids) -> None:
+        self.end_nudge()
         self.held = None
         self._born.clear()
         self.sources, self.source_id = table, source_id
@@ -167,13 +201,7 @@ class SourceEditor:
     @property
     def selected_ids(self) -> set[int]:
         """Ids of the sources that are selected, on either layer."""
-        ids: set[int] = set()
-        for view in self.views:
-            if view.layer is not None:
-                current = view.current_ids()
-                rows = [row for row in view.layer.selected_data if row < current.size]
-                ids.update(current[rows].tolist())
-        return ids
+        return {number for view in self.views for number in view.selected_ids().tolist()}
 
     def select(self, ids: Iterable[int]) -> None:
         """Select the sources with these ids, and no others."""
@@ -202,9 +230,26 @@ class SourceEditor:
 
     def deselect_all_but(self, layer: Any) -> None:
         """Select nothing on the layers of sources other than this one."""
-        for view in self.views:
-            if view.layer is not None and view.layer is not layer and view.layer.selected_data:
+        for view in self._others(layer):
+            if view.layer.selected_data:
                 view.layer.selected_data = set()
+
+    def select_in_box(self, layer: Any, corner: Any, opposite: Any) -> None:
+        """Select what has its centre in a box (world coordinates) on the layers but this one.
+
+        On this one, napari does it.
+        """
+        for view in self._others(layer):
+            if not view.layer.visible:
+                continue
+            ends = np.sort([view.layer.world_to_data(end)[-2:] for end in (corner, opposite)], 0)
+            centres = view.read().reshape(len(view.source_id), -1, 2).mean(axis=1)
+            inside = np.all((centres >= ends[0]) & (centres <= ends[1]), axis=1)
+            view.layer.selected_data = set(np.flatnonzero(inside).tolist())
+
+    def _others(self, layer: Any) -> list[SourceLayer]:
+        """Return the views whose layer is there, and is not this one."""
+        return [view for view in self.views if view.layer not in (None, layer)]
 
     def _selection_changed(self, event: Any = None) -> None:
         if not self._writing:
@@ -216,6 +261,7 @@ class SourceEditor:
             return
         action = str(getattr(event.action, "value", event.action))
         view = self.points if event.source is self.points.layer else self.ellipses
+        self.end_nudge()
         if action in ("changing", "adding"):
             self.take_over()
             moving: list[int] = []
@@ -224,6 +270,12 @@ class SourceEditor:
                 moving = [int(ids[row]) for row in event.data_indices if -1 <= row < len(ids)]
             else:
                 self._adding = True
+            self._along = None
+            if moving:
+                others = (set(v.selected_ids().tolist()) for v in self._others(view.layer))
+                along = set[int]().union(*others)
+                self._along = (moving[0], along) if along else None
+                moving += along
             self.held = HeldSources(self.sources, self.source_id, frozenset(moving))
         else:
             self.held = None
@@ -255,10 +307,42 @@ class SourceEditor:
                 show_error(str(error))
                 self.held = None
                 self.write()
+        self._draw_along()
         if self.held is None and self._untidy:
             self._adding = self._untidy = False
             self._tidy()
             self._note()
+
+    def _draw_along(self) -> None:
+        """Move what is selected on the other layer with the source that the mouse drags."""
+        if self.held is None or self._along is None:
+            return
+        leader, along = self._along
+        old, new = np.flatnonzero(self.held.source_id == leader), self._places([leader])
+        if not old.size or new[0] < 0:
+            return
+        before, now = self.held.sources[old[:1]], self.sources[new]
+        steps = {name: float(now[name][0] - before[name][0]) for name in ("x", "y")}
+        moved = before.copy()
+        for name, step in steps.items():
+            moved[name] += step
+        table, first = self.sources.copy(), self.held.sources
+        mine, origin = (np.isin(ids, list(along)) for ids in (self.source_id, self.held.source_id))
+        for name, step in steps.items():
+            # a handle changes more than the place, and the galaxies alone
+            now[name] = moved[name]
+            table[name][mine] = first[name][origin] + step
+        if not same_table(now, moved):
+            for name in steps:
+                table[name][mine] = first[name][origin]
+        if same_table(table, self.sources):
+            return
+        self.sources = table
+        self.version += 1
+        with self.quiet():
+            for view in self.views:
+                if along & set(view.source_id.tolist()):
+                    view.write(self.sources, self.source_id)
 
     def _refused(self, view: SourceLayer) -> bool:
         """Remove shapes that can be no sources, unless one is being drawn just now."""
@@ -275,6 +359,10 @@ class SourceEditor:
 
     def _adopt(self, view: SourceLayer) -> None:
         """Bring the table in step with one layer."""
+        if view.only_moved():
+            self.sources = self._moved(view)
+            view.note_geometry()
+            return
         mine = np.isin(self.source_id, view.source_id)
         if view.layer is None:
             self._bury(mine)
@@ -312,6 +400,17 @@ class SourceEditor:
                 view.in_step(self.sources[order], self.source_id[order])
         else:
             view.note_geometry()
+
+    def _moved(self, view: SourceLayer) -> QTable:
+        """Return the table with what was moved, resized or turned; the rest is not copied."""
+        rows, part = view.moved_part(self.sources, self._places(view.source_id))
+        # the columns are shared with the old table, and those that change replaced
+        table = QTable(self.sources, copy=False)
+        for name in ("x", "y", "r_half", "ellipticity", "pa"):
+            column = self.sources[name].copy()
+            column[rows] = part[name]
+            table[name] = column
+        return table
 
     def _drawn(self, view: SourceLayer, row: int) -> QTable:
         """Return the table row of a source that was drawn (as the form says) or pasted."""

@@ -50,9 +50,9 @@ class InstrumentForm(Form):
             "seed", scene.seed, "Seed of the Poisson noise of the picture; takes effect with Enter"
         )
         self.new_noise = PushButton(text="&New noise", tooltip="Draw the noise anew (next seed)")
-        self.add("Channel", self.channel)
-        self.add("Wheels 1, 2", self.wheel1, self.wheel2)
-        self.add("Exposure (s)", self.exposure)
+        self.add("&Channel", self.channel)
+        self.add("Wheels &1, 2", self.wheel1, self.wheel2)
+        self.add("E&xposure (s)", self.exposure)
         self.add("Frame (px)", self.frame)
         self.add("Noise seed", self.seed, self.new_noise)
         self.sky = self.add_text("Background with the filters in place, by parts")

@@ -38,14 +38,14 @@ class HeldSources:
     """Sources held by the mouse: the table when it was pressed, and which of them move.
 
     ``live`` holds the count rate that follows them, with the observation it belongs to;
-    ``drawn`` the latest expected counts and counts, with the seed.
+    ``drawn`` the latest expected counts and counts, with the observation and the seed.
     """
 
     sources: QTable
     source_id: NDArray[np.int64]
     moving: frozenset[int]
     live: tuple[Rendered, Drag] | None = field(default=None)
-    drawn: tuple[int, Array, NDArray[np.int64]] | None = field(default=None)
+    drawn: tuple[tuple[Observation, int], Array, NDArray[np.int64]] | None = field(default=None)
 
 
 class PictureMaker:
@@ -78,14 +78,17 @@ class PictureMaker:
         live = held.live[1]
         moving = np.isin(source_id, held.source_id, invert=True)
         moving |= np.isin(source_id, list(held.moving))
-        live.move(sources[moving])
-        expected = np.maximum(live.rate, 0.0) * observation.transmittance
-        expected = (expected + observation.sky_rate) * observation.exposure
-        previous = None
-        if held.drawn is not None and held.drawn[0] == seed:
-            previous = held.drawn[1:]
-        counts = poisson_counts(expected, seed, previous=previous)
-        held.drawn = (seed, expected, counts)
+        windows = live.move(sources[moving])
+        if held.drawn is not None and held.drawn[0] == (observation, seed):
+            _, before, counts = held.drawn
+            expected = before.copy()
+            for window in windows:
+                expected[window] = _expected(live.rate[window], observation)
+            counts = poisson_counts(expected, seed, previous=(before, counts), windows=windows)
+        else:
+            expected = _expected(live.rate, observation)
+            counts = poisson_counts(expected, seed)
+        held.drawn = ((observation, seed), expected, counts)
         table = QTable(sources, copy=True)
         return Picture(Exposure(counts, expected, table, observation, seed), final=False)
 
@@ -129,6 +132,12 @@ class PictureMaker:
             negligible=PREVIEW_SHARE * observation.replace(filters=OPEN).sky_rate,
             rest=rest,
         )
+
+
+def _expected(rate: Array, observation: Observation) -> Array:
+    """Return the expected counts of rates at open-open."""
+    sources = np.maximum(rate, 0.0) * observation.transmittance
+    return (sources + observation.sky_rate) * observation.exposure
 
 
 def _rendered(observation: Observation) -> Rendered:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from qtpy.QtGui import QCursor
@@ -33,18 +34,35 @@ class Pointer:
         self.viewer.events.status.connect(self._status)
         self._describe_soon = qthrottled(self.describe, timeout=REST)
 
-    def _press(self, _viewer: Any, event: Any) -> None:
-        """Let the press pick the source under the pointer, and only it unless Shift is held."""
+    def _press(self, _viewer: Any, event: Any) -> Iterator[None]:
+        """Let the press pick the source under the pointer, and only it unless Shift is held.
+
+        What is selected on the active layer is napari's business. A source that is selected
+        already keeps those on the other layer with it, unless it is clicked and not dragged.
+        """
         self.hide()
-        layers, ours = self.viewer.layers, self.scene.layers
+        layers, ours, editor = self.viewer.layers, self.scene.layers, self.scene.editor
         if event.button != 1 or not has_mouse(layers, ours):
             return
         found = source_under(layers, ours, event.position)
         if found is not None:
             activate(layers, found[0])
-        if not {"Shift", "Control"} & set(event.modifiers):
-            # what is selected on the active layer is napari's business
-            self.scene.editor.deselect_all_but(layers.selection.active)
+        if {"Shift", "Control"} & set(event.modifiers):
+            return
+        active, start = layers.selection.active, event.position
+        keeps = found is not None and (found[1] is None or _id(*found) in editor.selected_ids)
+        if not keeps:
+            editor.deselect_all_but(active)
+        draws_box = found is None and active.mode == "select"
+        moved = False
+        yield
+        while event.type == "mouse_move":
+            moved = True
+            yield
+        if draws_box and moved:
+            editor.select_in_box(active, start, event.position)
+        elif keeps and not moved:
+            editor.deselect_all_but(active)
 
     def _double_click(self, _viewer: Any, event: Any) -> None:
         """Remove the source under the pointer."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, cast
 from weakref import WeakValueDictionary
 
@@ -35,6 +35,14 @@ _SCENES: WeakValueDictionary[int, Scene] = WeakValueDictionary()
 PAUSE = 200
 # When a zoom rests for so long (ms), the ellipses' edges are drawn as thin as before.
 ZOOM_PAUSE = 80
+# A picture that is not there after so long (ms) is slow.
+SLOW = 300
+# Key presses with no more than this (ms) between them are one nudge.
+BURST = 600
+# Arrow keys: a pixel to the right and up; with Shift a part of it.
+ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Down": (0, -1), "Up": (0, 1)}
+FINE_STEP = 0.1
+DELETE_KEYS = ("Delete", "Backspace")
 # Row 0 at the bottom and x to the right, as astronomers expect.
 ORIENTATION = ("up", "right")
 
@@ -56,7 +64,7 @@ class Scene:
         ``picture`` after each exposure that came to the screen at rest, ``shown`` after each
         one, previews included, ``observation`` after a change of the instrument set-up or the seed,
         ``sources`` after a change of the source table, also during a drag, ``selection`` when
-        other sources are selected.
+        other sources are selected, ``progress`` after a change of `slow` or `cancelled`.
     units : Units
         What fluxes and lengths are shown in.
     """
@@ -70,6 +78,7 @@ class Scene:
             observation=Event,
             sources=Event,
             selection=Event,
+            progress=Event,
         )
         self.editor = SourceEditor(self._soon, self._selected)
         self.counts = CountsLayer()
@@ -100,6 +109,17 @@ class Scene:
         self._pause.setSingleShot(True)
         self._pause.setInterval(PAUSE)
         self._pause.timeout.connect(self._request_final)
+        self._has_arrows = False
+        self._slow = False
+        self._cancelled: Any = None
+        self._patience = QTimer()
+        self._patience.setSingleShot(True)
+        self._patience.setInterval(SLOW)
+        self._patience.timeout.connect(self._be_slow)
+        self._burst = QTimer()
+        self._burst.setSingleShot(True)
+        self._burst.setInterval(BURST)
+        self._burst.timeout.connect(self._end_nudge)
 
         self.pointer = Pointer(self)
         viewer.layers.events.removed.connect(self._layer_removed)
@@ -188,6 +208,33 @@ class Scene:
         """Whether the picture is that of the scene as it is now, and no preview."""
         return not self._timer.isActive() and self._shown == (self._version, True)
 
+    @property
+    def slow(self) -> bool:
+        """Whether a picture is being made and takes long."""
+        return self._slow
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether the picture of the scene as it is now was cancelled: an older one is shown."""
+        return bool(self._cancelled == self._version)
+
+    def cancel(self) -> None:
+        """Keep the picture that is shown; the scene is simulated at its next change.
+
+        What is being computed runs on to its end in the background; its result is dropped.
+        """
+        if self._jobs.busy:
+            self._jobs.cancel()
+            self._cancelled, self._requested = self._version, (None, False)
+            self._watch()
+
+    def simulate(self) -> None:
+        """Simulate the scene after all, if that was cancelled."""
+        if self.cancelled:
+            self._cancelled = None
+            self.events.progress()
+            self._soon()
+
     def new_noise(self) -> None:
         """Draw the noise anew: the next seed."""
         self.seed = self._seed + 1
@@ -227,6 +274,25 @@ class Scene:
         self.editor.remove(ids)
         self._show_sources()
 
+    def nudge(self, right: float, up: float) -> None:
+        """Move the selected sources as seen on the screen; several moves at once are one step.
+
+        Parameters
+        ----------
+        right, up : float
+            Pixels.
+        """
+        if self.viewer.scene.camera.orientation2d[0] == "down":
+            up = -up
+        self.editor.take_over()
+        if self.editor.nudge(right, up):
+            self._burst.start()
+            self._soon()
+
+    def _end_nudge(self) -> None:
+        self.editor.end_nudge()
+        self._soon()
+
     def undo(self, event: Any = None) -> None:
         """Take back the last edit of the sources; nothing while the mouse holds one."""
         self.editor.take_over()
@@ -255,6 +321,7 @@ class Scene:
             If the picture could not be made; the cause is chained.
         """
         self.show_layers()
+        self.simulate()
         self._refresh()
         until = time.monotonic() + timeout
         while not self.settled:
@@ -332,8 +399,31 @@ class Scene:
         """Bind our keys on a layer of ours: those of the viewer belong to the user."""
         layer.bind_key("Control-Z", self.undo, overwrite=True)
         layer.bind_key("Control-Shift-Z", self.redo, overwrite=True)
+        for key in DELETE_KEYS:
+            layer.bind_key(key, self._remove_selected, overwrite=True)
+        self._bind_arrows(layer)
+
+    def _remove_selected(self, layer: Any) -> None:
+        """Remove what is selected on either layer; napari would on the active one alone."""
+        if not getattr(layer, "_is_creating", False):
+            self.remove(self.editor.selected_ids)
+
+    def _bind_arrows(self, layer: Any) -> None:
+        """Let the arrow keys move the selected sources; without any they are napari's."""
+        for key, (right, up) in ARROWS.items():
+            for modifier, step in (("", 1.0), ("Shift-", FINE_STEP)):
+
+                def move(_: Any, right: float = step * right, up: float = step * up) -> None:
+                    self.nudge(right, up)
+
+                layer.bind_key(modifier + key, move if self._has_arrows else None, overwrite=True)
 
     def _selected(self) -> None:
+        self.editor.end_nudge()
+        if self._has_arrows != bool(self.editor.selected_ids):
+            self._has_arrows = not self._has_arrows
+            for layer in self.layers:
+                self._bind_arrows(layer)
         self.events.selection()
 
     def _fit_marks(self) -> None:
@@ -402,22 +492,21 @@ class Scene:
 
     def _request_final(self) -> None:
         ticket = (self._version, True)
-        if self._requested == ticket and (
-            self._jobs.busy or self._shown == ticket or self._error is not None
+        asked = self._requested == ticket
+        if self.cancelled or (
+            asked and (self._jobs.busy or self._shown == ticket or self._error is not None)
         ):
             return
-        self._requested, self._error = ticket, None
         maker = self._maker
         sources, observation, seed = self.editor.sources, self._observation, self._seed
 
         def job() -> tuple[Any, Picture]:
             return ticket, maker.final(sources, observation, seed)
 
-        self._jobs.request(job)
+        self._request(ticket, job)
 
     def _request_preview(self, held: HeldSources) -> None:
         ticket = (self._version, False)
-        self._requested, self._error = ticket, None
         maker, editor = self._maker, self.editor
         sources, source_id = editor.sources, editor.source_id
         observation, seed = self._observation, self._seed
@@ -425,9 +514,34 @@ class Scene:
         def job() -> tuple[Any, Picture]:
             return ticket, maker.preview(held, sources, source_id, observation, seed)
 
+        self._request(ticket, job)
+
+    def _request(self, ticket: Any, job: Callable[[], Any]) -> None:
+        self._requested, self._error = ticket, None
+        if self._cancelled is not None:
+            self._cancelled = None
+            self.events.progress()
         self._jobs.request(job)
+        if not self._slow and not self._patience.isActive():
+            self._patience.start()
+
+    def _be_slow(self) -> None:
+        if self._jobs.busy and not self.cancelled:
+            self._slow = True
+            self.events.progress()
+
+    def _watch(self) -> None:
+        """Begin to wait for the next picture, if there is to be one."""
+        if self._jobs.busy and not self.cancelled:
+            self._patience.start()
+        else:
+            self._patience.stop()
+        if self._slow or self.cancelled:
+            self._slow = False
+            self.events.progress()
 
     def _show(self, result: tuple[Any, Picture]) -> None:
+        self._watch()
         if not self.layers:
             return
         self._shown, picture = result
@@ -448,6 +562,7 @@ class Scene:
 
     def _failed(self, error: BaseException) -> None:
         # The last good picture stays.
+        self._watch()
         self._error = error
         show_error(f"The scene could not be simulated: {error}")
 

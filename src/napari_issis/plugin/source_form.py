@@ -139,12 +139,12 @@ class SourceForm(Form):
         )
 
     def _lay_out(self) -> None:
-        units = self.add("&Units", self.flux_unit, self.length_unit)
+        units = self.add("Unit&s", self.flux_unit, self.length_unit)
         units.layout().setStretch(0, 5)
         units.layout().setStretch(1, 4)
         self.add("&Mode", self.mode)
         self._add_row("&Kind", self.kind, modes="specific random")
-        self._add_row("Number", self.number, modes="random cluster")
+        self._add_row("Num&ber", self.number, modes="random cluster")
         self._add_row("x, y (px)", self.x, self.y, modes="specific cluster")
         self._flux_row = self._add_row("F", self.flux, modes="specific")
         self._r_row = self._add_row("R½", self.r_half, modes="specific", kinds=EXTENDED)
@@ -158,7 +158,7 @@ class SourceForm(Form):
         self._add_limits("Ellipticity", self.e_limits, EXTENDED)
         self._add_limits("PA (°)", self.pa_limits, EXTENDED)
         self._add_limits("Sérsic n", self.n_limits, SERSIC)
-        self._add_row("Seed", self.seed, modes="random cluster")
+        self._add_row("See&d", self.seed, modes="random cluster")
 
     def _add_row(
         self, label: str, *widgets: Field, modes: str, kinds: frozenset[str] = ALL_KINDS

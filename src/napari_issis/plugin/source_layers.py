@@ -96,8 +96,7 @@ class SourceLayer:
         return not (
             data.shape == self._geometry.shape
             and np.array_equal(data, self._geometry)
-            and len(self.layer.features) == len(self._features)
-            and self.layer.features.reindex(columns=self._features.columns).equals(self._features)
+            and self._same_features()
         )
 
     def current_ids(self) -> Ids:
@@ -107,6 +106,13 @@ class SourceLayer:
             return np.full(len(table), -1, dtype=np.int64)
         ids = pd.to_numeric(table["source_id"], errors="coerce").fillna(-1)
         return np.array(ids, dtype=np.int64)
+
+    def selected_ids(self) -> Ids:
+        """Ids of the selected rows."""
+        if self.layer is None:
+            return np.empty(0, dtype=np.int64)
+        current = self.current_ids()
+        return current[[row for row in self.layer.selected_data if row < current.size]]
 
     def write(self, table: QTable, source_id: Ids) -> None:
         """Show the rows of the table that belong here."""
@@ -174,6 +180,38 @@ class SourceLayer:
         if not current.reindex(columns=written.columns).equals(written):
             table = adopt_features(table, written, current)
         return self.moved(table, self._geometry[before], self.read()[rows])
+
+    def only_moved(self) -> bool:
+        """Whether the layer holds the same sources as when last in step, some of them moved."""
+        return (
+            self.layer is not None
+            and np.array_equal(self.current_ids(), self.source_id)
+            and self._same_features()
+        )
+
+    def moved_part(
+        self, table: QTable, places: NDArray[np.intp]
+    ) -> tuple[NDArray[np.intp], QTable]:
+        """Return the rows of the table that moved, and how they are now.
+
+        Parameters
+        ----------
+        table : astropy.table.QTable
+            The master table.
+        places : ndarray of int
+            Its rows in the order of the layer's.
+        """
+        current = self.read()
+        moved = np.flatnonzero(
+            np.any((current != self._geometry).reshape(len(current), -1), axis=1)
+        )
+        rows = places[moved]
+        return rows, self.moved(table[rows], self._geometry[moved], current[moved])
+
+    def _same_features(self) -> bool:
+        return len(self.layer.features) == len(self._features) and bool(
+            self.layer.features.reindex(columns=self._features.columns).equals(self._features)
+        )
 
     def note_geometry(self) -> None:
         """Note the geometry as it is now, without touching the layer (during a drag)."""

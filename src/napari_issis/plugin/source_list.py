@@ -66,6 +66,8 @@ class SourceList(QWidget):  # type: ignore[misc]
         self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.view.setSortingEnabled(True)
         self.view.setWordWrap(False)
+        # Tab goes on to the buttons; the arrows go from cell to cell
+        self.view.setTabKeyNavigation(False)
         across, down = self.view.horizontalHeader(), self.view.verticalHeader()
         across.setSortIndicator(-1, Qt.SortOrder.AscendingOrder)
         across.setSortIndicatorClearable(True)
@@ -80,17 +82,13 @@ class SourceList(QWidget):  # type: ignore[misc]
         row.addWidget(self.count)
         row.addStretch(1)
         for label, tooltip, action in (
-            ("&Undo", "Take back the last edit (Ctrl+Z)", self.scene.undo),
-            ("&Redo", "Do it again (Ctrl+Shift+Z)", self.scene.redo),
-            ("&Copy", "Copy the selected rows as text (Ctrl+C)", self.copy),
-            ("&Paste", "Add sources from text, as of a spreadsheet (Ctrl+V)", self.paste),
-            ("&Delete", "Remove the selected sources (Del)", self.delete),
-            (
-                "&Import…",
-                "Add a catalogue: ECSV, CSV, FITS, VOTable, DS9",
-                self.load,
-            ),
-            ("&Export…", "Write the sources to a file: ECSV, CSV, FITS, VOTable", self.save),
+            ("Undo", "Take back the last edit (Ctrl+Z)", self.scene.undo),
+            ("Redo", "Do it again (Ctrl+Shift+Z)", self.scene.redo),
+            ("Copy", "Copy the selected rows as text (Ctrl+C)", self.copy),
+            ("Paste", "Add sources from text, as of a spreadsheet (Ctrl+V)", self.paste),
+            ("Delete", "Remove the selected sources (Del)", self.delete),
+            ("&Import…", "Add a catalogue: ECSV, CSV, FITS, VOTable, DS9", self.load),
+            ("Expor&t…", "Write the sources to a file: ECSV, CSV, FITS, VOTable", self.save),
         ):
             button = QPushButton(label)
             button.setToolTip(tooltip)

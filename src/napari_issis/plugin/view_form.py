@@ -9,6 +9,7 @@ from magicgui.widgets import CheckBox, ComboBox, PushButton
 from .canvas_geometry import find_canvas
 from .compass import Compass
 from .form import Form
+from .keys import shown
 from .scene import Scene
 from .side_by_side import SideBySide
 from .trace_docks import FREEZE_KEY, show_traces, traces_shown
@@ -40,11 +41,11 @@ class ViewForm(Form):
             value=self.frames.enabled,
             tooltip="Source model and final image in one frame, or in two that zoom together",
         )
-        self.fit = PushButton(text="Fit", tooltip=f"Show the whole frame ({_shown(FIT_KEY)})")
+        self.fit = PushButton(text="Fit", tooltip=f"Show the whole frame ({shown(FIT_KEY)})")
         self.factors = {
             factor: PushButton(
                 text=f"{factor}×",
-                tooltip=f"Let 1/{factor} of the frame fill the canvas ({_shown(KEYS[factor])})",
+                tooltip=f"Let 1/{factor} of the frame fill the canvas ({shown(KEYS[factor])})",
             )
             for factor in FACTORS
         }
@@ -52,15 +53,15 @@ class ViewForm(Form):
             choices=[("frame", "frame"), ("selected sources", "selected")],
             tooltip="About what to zoom; the frame, while no source is selected",
         )
-        self.scale_bar = CheckBox(text="Scale bar", tooltip="napari's scale bar, in arcsec")
-        self.compass = CheckBox(text="N, E", tooltip="Mark north and east, by the roll")
+        self.scale_bar = CheckBox(text="&Scale bar", tooltip="napari's scale bar, in arcsec")
+        self.compass = CheckBox(text="&N, E", tooltip="Mark north and east, by the roll")
         self.trace = CheckBox(
-            text="Traces",
+            text="Tra&ces",
             tooltip="Plot the row and the column under the pointer "
-            f"({_shown(FREEZE_KEY)} freezes them)",
+            f"({shown(FREEZE_KEY)} freezes them)",
         )
         self.add("Frames", self.layout_)
-        self.add("Zoom", self.fit, *self.factors.values())
+        self.add("&Zoom", self.fit, *self.factors.values())
         for button in (self.fit, *self.factors.values()):
             button.native.setMinimumWidth(30)
             button.native.setStyleSheet("padding: 2px;")
@@ -154,7 +155,3 @@ class ViewForm(Form):
             traces.frozen = not traces.frozen
 
         layer.bind_key(FREEZE_KEY, freeze, overwrite=True)
-
-
-def _shown(key: str) -> str:
-    return key.replace("Control-", "Ctrl+").replace("-", "+")
