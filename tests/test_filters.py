@@ -39,6 +39,25 @@ def test_rate_of_a_flat_spectrum():
     assert observation.cps_per_flux == pytest.approx(1.14e17 * expected, rel=1e-10)
 
 
+@pytest.mark.parametrize(
+    ("channel", "name", "cps", "pivot"),
+    [
+        ("NUV", "N2500", 4.2719204e15, 2499.478265),
+        ("FUV", "N1550", 3.0584622e14, 1549.148303),
+        ("FUV", "LP1370", 1.831499e15, 1556.0731),
+    ],
+)
+def test_as_synphot_has_it(channel, name, cps, pivot):
+    """Count rate of 1 FLAM and pivot of the same curve by synphot 1.8.0, in steps of 0.1 A.
+
+    There: SpectralElement(Empirical1D) of the curve within the band, an area of 76.71791 or
+    664.33393 cm2, Observation(ConstFlux1D).countrate and pivot().
+    """
+    observation = ni.Observation(channel, (name, "open"))
+    assert observation.cps_per_flux == pytest.approx(cps, rel=3e-6)
+    assert observation.pivot == pytest.approx(pivot, rel=3e-7)
+
+
 def test_a_given_background_passes_as_a_flat_spectrum():
     """Catches a background that no curve reduces."""
     observation = ni.Observation(filters=("NF1", CURVE), background=0.2)
