@@ -528,7 +528,8 @@ class Scene:
 
     def _show(self, result: tuple[Any, Picture]) -> None:
         self._watch()
-        if not self.layers:
+        # also while a window is being closed, which takes the layers away one by one
+        if not self.layers or any(layer not in self.viewer.layers for layer in self.layers):
             return
         self._shown, picture = result
         previous, self._picture = self._picture, picture
