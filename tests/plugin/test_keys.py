@@ -27,6 +27,15 @@ README = Path(__file__).parents[2] / "README.md"
 SHIFT, CONTROL = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
 
 
+@pytest.fixture(autouse=True)
+def _no_key_held(qtbot):
+    """Let go of Ctrl and Shift, which Qt holds for pressed after a key with a modifier."""
+    yield
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    QTest.keyClick(widget, Qt.Key.Key_Control)
+
+
 @pytest.fixture
 def window(make_napari_viewer):
     """A viewer on the screen with panel, list and traces."""

@@ -6,9 +6,12 @@ import astropy.units as u
 import numpy as np
 import pytest
 from astropy.coordinates import SkyCoord
-from qtpy.QtWidgets import QToolTip
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import QApplication, QToolTip
 from small_scene import SMALL, few_sources
 
+from napari_issis.plugin.canvas_geometry import find_canvas
+from napari_issis.plugin.dock import SimulatorWidget
 from napari_issis.plugin.readout import pixel_text, sky_offset, source_text
 from napari_issis.plugin.units import Units
 
@@ -77,6 +80,21 @@ def test_moving_the_pointer_shows_the_tooltip(scene, over, qtbot):
     qtbot.waitUntil(lambda: QToolTip.text().startswith("point"), timeout=2000)
     scene.viewer.cursor.position = (5.0 * 0.036, 5.0 * 0.036)
     qtbot.waitUntil(lambda: scene.pointer.shown == "", timeout=2000)
+
+
+@pytest.mark.needs_gl
+def test_fingers_and_pens_are_left_to_qt(make_napari_viewer):
+    """Catches a canvas that takes touch events: Qt makes mouse events of those left to it."""
+    viewer = make_napari_viewer(show=True)
+    panel = SimulatorWidget(viewer)
+    viewer.window.add_dock_widget(panel)
+    canvas = find_canvas(panel)
+    while canvas is not None:
+        assert not canvas.testAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)
+        canvas = canvas.parentWidget()
+    for attribute in ("Touch", "Tablet"):
+        name = f"AA_SynthesizeMouseForUnhandled{attribute}Events"
+        assert QApplication.testAttribute(getattr(Qt.ApplicationAttribute, name))
 
 
 def test_the_status_line(scene):

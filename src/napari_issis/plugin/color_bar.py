@@ -71,7 +71,7 @@ class ColorBar(QWidget):  # type: ignore[misc]
         magnitude = surface_brightness(
             rate,
             cps_per_flux=observation.cps_per_flux,
-            pivot=observation.channel_data.pivot,
+            pivot=observation.pivot,
             pixel_scale=observation.pixel_scale,
         )
         return [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -149,12 +149,13 @@ class SourceEditor:
             self._nudging = True
             ids = frozenset(self.source_id[moving].tolist())
             self.held = HeldSources(self.sources, self.source_id, ids)
+        assert self.held is not None
         table = self.sources.copy()
         table["x"][moving] += dx
         table["y"][moving] += dy
         self.sources = table
         self.version += 1
-        self.write()
+        self.write(self.held.moving)
         return True
 
     def end_nudge(self) -> None:
@@ -185,11 +186,12 @@ class SourceEditor:
             (int(number), (rows, place)) for place, number in enumerate(self.source_id[gone])
         )
 
-    def write(self) -> None:
-        """Make the layers show the table."""
+    def write(self, ids: Collection[int] | None = None) -> None:
+        """Make the layers show the table: all of them, or those that hold one of these ids."""
         with self.quiet():
             for view in self.views:
-                view.write(self.sources, self.source_id)
+                if ids is None or np.isin(view.source_id, list(ids)).any():
+                    view.write(self.sources, self.source_id)
 
     def listen(self, layer: Any) -> None:
         """Follow the edits of a layer."""
@@ -339,10 +341,7 @@ class SourceEditor:
             return
         self.sources = table
         self.version += 1
-        with self.quiet():
-            for view in self.views:
-                if along & set(view.source_id.tolist()):
-                    view.write(self.sources, self.source_id)
+        self.write(along)
 
     def _refused(self, view: SourceLayer) -> bool:
         """Remove shapes that can be no sources, unless one is being drawn just now."""

@@ -12,7 +12,7 @@ from ..counts import poisson_counts
 from ..drag import Drag
 from ..exposure import Exposure, accuracy_for_counts, expose, noise_ready_rate, same_table
 from ..limits import count_rate_warnings
-from ..observation import OPEN, Observation
+from ..observation import Observation
 
 Array = NDArray[np.float64]
 # what a rate depends on, beside the sources
@@ -59,7 +59,11 @@ class PictureMaker:
         rate, clipped = self._rate(sources, observation)
         return Picture(
             expose(rate, sources, observation, seed=seed, clipped=clipped),
-            tuple(count_rate_warnings(rate, observation.sky_rate)),
+            tuple(
+                count_rate_warnings(
+                    rate, observation.background_rate, sources=sources, observation=observation
+                )
+            ),
         )
 
     def preview(
@@ -95,11 +99,12 @@ class PictureMaker:
     def _rate(self, sources: QTable, observation: Observation) -> tuple[Array, float]:
         rendered = _rendered(observation)
         if not self._keeps(sources, rendered):
-            rate, clipped = noise_ready_rate(sources, observation.replace(filters=OPEN))
+            rate, clipped = noise_ready_rate(sources, observation.without_neutral_filters())
             self._kept = (sources, rendered, rate, clipped)
         assert self._kept is not None
         _, _, rate, clipped = self._kept
-        return rate * observation.transmittance, clipped * observation.transmittance
+        passed = observation.neutral_transmittance
+        return rate * passed, clipped * passed
 
     def _keeps(self, sources: QTable, rendered: Rendered) -> bool:
         return (
@@ -110,7 +115,7 @@ class PictureMaker:
 
     def _rest(self, held: HeldSources, observation: Observation) -> Array:
         """Rate of the sources that do not move: the whole less the others, if it is known."""
-        observation = observation.replace(filters=OPEN)
+        observation = observation.without_neutral_filters()
         moving = np.isin(held.source_id, list(held.moving))
         if self._keeps(held.sources, _rendered(observation)):
             whole, _ = self._rate(held.sources, observation)
@@ -129,15 +134,15 @@ class PictureMaker:
             bare,
             range(len(moving)),
             tolerance=PREVIEW_TOLERANCE,
-            negligible=PREVIEW_SHARE * observation.replace(filters=OPEN).sky_rate,
+            negligible=PREVIEW_SHARE * observation.without_neutral_filters().sky_rate,
             rest=rest,
         )
 
 
 def _expected(rate: Array, observation: Observation) -> Array:
     """Return the expected counts of rates at open-open."""
-    sources = np.maximum(rate, 0.0) * observation.transmittance
-    return (sources + observation.sky_rate) * observation.exposure
+    sources = np.maximum(rate, 0.0) * observation.neutral_transmittance
+    return (sources + observation.background_rate) * observation.exposure
 
 
 def _rendered(observation: Observation) -> Rendered:
@@ -145,5 +150,7 @@ def _rendered(observation: Observation) -> Rendered:
 
     Rates are kept at open-open, for one second and without a sky.
     """
-    bare = observation.replace(filters=OPEN, exposure=1.0, background=0.0, pointing=None, roll=0.0)
+    bare = observation.without_neutral_filters().replace(
+        exposure=1.0, background=0.0, dark=0.0, pointing=None, roll=0.0
+    )
     return bare, accuracy_for_counts(observation)

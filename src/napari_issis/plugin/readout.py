@@ -73,7 +73,7 @@ def source_text(row: Row, observation: Observation, units: Units) -> str:
         What fluxes and radii are shown in.
     """
     table = row.table[[row.index]]
-    pivot = observation.channel_data.pivot
+    pivot = observation.pivot
     one = check_sources(table, pivot=pivot, pixel_scale=observation.pixel_scale)
     kind = str(one.kind[0])
     lines = [

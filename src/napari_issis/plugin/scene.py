@@ -168,7 +168,7 @@ class Scene:
             return
         reframed = observation.shape != self._observation.shape
         self._observation = observation
-        self.editor.pivot = observation.channel_data.pivot
+        self.editor.pivot = observation.pivot
         if reframed:
             self._fit_marks()
         self.counts.rescale(always=True)
@@ -542,7 +542,8 @@ class Scene:
 
     def _show(self, result: tuple[Any, Picture]) -> None:
         self._watch()
-        if not self.layers:
+        # also while a window is being closed, which takes the layers away one by one
+        if not self.layers or any(layer not in self.viewer.layers for layer in self.layers):
             return
         self._shown, picture = result
         previous, self._picture = self._picture, picture

@@ -96,7 +96,7 @@ def heading(column: Column, units: Units) -> str:
 
 def shown_values(table: QTable, observation: Observation, units: Units) -> dict[str, Any]:
     """Values of all columns in the units shown, each of shape (n,); NaN where there is none."""
-    pivot = observation.channel_data.pivot
+    pivot = observation.pivot
     arrays = check_sources(table, pivot=pivot, pixel_scale=observation.pixel_scale)
     extended = arrays.kind != "point"
     return {
@@ -147,7 +147,7 @@ def changed(
     else:
         _set(one, name, read_number(name, typed), observation, units)
     try:
-        check_sources(one, pivot=observation.channel_data.pivot)
+        check_sources(one, pivot=observation.pivot)
     except ValueError as error:
         raise ValueError(str(error).removeprefix("row 0, ")) from None
     table = table.copy()
@@ -159,7 +159,7 @@ def changed(
 
 
 def _set(one: QTable, name: str, number: float, observation: Observation, units: Units) -> None:
-    pivot = observation.channel_data.pivot
+    pivot = observation.pivot
     if name == "flux":
         unit = one["flux"].unit
         flux = units.read_flux(number, pivot)
@@ -283,7 +283,7 @@ def _row(row: dict[str, str], observation: Observation, units: Units) -> dict[st
     def number(name: str, default: float) -> float:
         return read_number(name, row[name]) if name in row else default
 
-    pivot = observation.channel_data.pivot
+    pivot = observation.pivot
     flux = units.read_flux(number("flux", 0.0), pivot) if "flux" in row else DEFAULT_FLUX
     r_half = number("r_half", np.nan)
     return {

@@ -200,7 +200,7 @@ class SourceForm(Form):
         for box, unit in ((self.flux_unit, units.flux), (self.length_unit, units.length)):
             with box.changed.blocked():
                 box.value = unit
-        flux_scale = units.flux_scale(observation.channel_data.pivot)
+        flux_scale = units.flux_scale(observation.pivot)
         length_scale = units.length_scale(observation.pixel_scale)
         self.flux.show_in(flux_scale)
         self.relabel(self._flux_row, f"F ({units.flux_label})")

@@ -166,7 +166,7 @@ class Traces:
                 along: trace.index,
                 "instrument": observation.instrument,
                 "channel": observation.channel,
-                "filters": list(observation.filters),
+                "filters": list(observation.filter_names),
                 "exposure": observation.exposure * u.s,
                 "background": trace.background * u.ct,
                 "pixel_scale": observation.pixel_scale * u.arcsec / u.pix,

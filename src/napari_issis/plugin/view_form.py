@@ -68,7 +68,7 @@ class ViewForm(Form):
         self.add("About", self.centre)
         self.add("Show", self.scale_bar, self.compass, self.trace)
         for box in (self.scale_bar, self.compass, self.trace):
-            text = box.native.fontMetrics().horizontalAdvance(box.text)
+            text = box.native.fontMetrics().horizontalAdvance(box.text.replace("&", ""))
             box.native.setMinimumWidth(text + CHECK_BOX)
 
         self.layout_.changed.connect(self._lay_out)
