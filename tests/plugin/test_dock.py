@@ -15,7 +15,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 from small_scene import SMALL, few_sources
 
-from napari_issis import Exposure, random_sources, simulate, source
+from napari_issis import SKIES, Exposure, Filter, random_sources, simulate, source
 from napari_issis.exposure import same_table
 from napari_issis.plugin import exposure_layers, samples
 from napari_issis.plugin.dock import SimulatorWidget
@@ -435,3 +435,38 @@ def test_the_picture_on_the_screen(make_napari_viewer):
     assert x < 0.5 * width
     red = np.argwhere((marked[..., 0] > 150) & (marked[..., 1] < 60))
     assert red.mean(axis=0) == pytest.approx([y, x], abs=3)
+
+
+def test_filters_with_a_curve_and_skies(scene, instrument, tmp_path, monkeypatch):
+    """Catches a curve that the picture ignores, and a channel that keeps a filter it cannot use."""
+    instrument.wheel2.value = "N2500"
+    instrument.sky_model.value = SKIES["HST high"]
+    scene.wait()
+    observation = SMALL.replace(filters=("open", "N2500"), sky=SKIES["HST high"])
+    assert scene.exposure == simulate(few_sources(), observation)
+    assert "zodiacal light" in instrument.sky.text()
+    assert "N1550" not in instrument.wheel1.choices
+    instrument.channel.value = "FUV"
+    assert scene.observation.filters == ("open", "open")
+    assert "N1550" in instrument.wheel1.choices
+    path = tmp_path / "mine.csv"
+    path.write_text("wavelength_A,transmission\n1200,0\n1300,0.5\n1500,0.5\n1600,0\n")
+    monkeypatch.setattr(instrument, "ask_path", lambda: str(path))
+    instrument.wheel1.value = "load"
+    scene.wait()
+    own = Filter.read(path)
+    assert scene.observation.filters == (own, "open")
+    assert instrument.wheel1.value == own
+    assert scene.exposure == simulate(few_sources(), scene.observation)
+
+
+def test_a_wrong_curve_leaves_the_wheel(scene, instrument, tmp_path, monkeypatch):
+    """Catches a wheel that shows a filter which is not in it."""
+    notification_manager.records.clear()
+    (tmp_path / "wrong.csv").write_text("nonsense\n1\n")
+    for path in (str(tmp_path / "wrong.csv"), None):
+        monkeypatch.setattr(instrument, "ask_path", lambda path=path: path)
+        instrument.wheel1.value = "load"
+        assert instrument.wheel1.value == "open"
+        assert scene.observation.filters == ("open", "open")
+    assert len(notification_manager.records) == 1

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
+from qtpy.QtWidgets import QFileDialog
 
-from ..instrument import CHANNELS, FILTERS, FRAME_SIZES, PIXEL_SCALE, PSF_NOTE
+from ..filter_set import FILTER_NAMES, FILTER_NOTE, ILLUSTRATIVE_FILTERS
+from ..filters import Filter
+from ..instrument import CHANNELS, FRAME_SIZES, PIXEL_SCALE, PSF_NOTE
 from ..observation import Observation
+from ..sky import SKIES
 from .form import Form
 from .number_field import NumberField, SeedField
 from .scene import Scene
 
+# What the last entry of a wheel stands for.
+LOAD = "load"
 # Black on amber is readable in napari's dark and light themes.
 WARNING_STYLE = "color: #111; background: #ffcf5c; padding: 3px; border-radius: 3px;"
 
@@ -33,9 +40,12 @@ class InstrumentForm(Form):
             choices=[(_channel_text(name), name) for name in CHANNELS],
             tooltip="Channel of the camera and its spectral range",
         )
-        wheel = "Filter wheels: open, or a neutral filter that passes 0.1 (NF1) or 0.01 (NF2)"
-        self.wheel1 = ComboBox(choices=list(FILTERS), tooltip=wheel)
-        self.wheel2 = ComboBox(choices=list(FILTERS), tooltip=wheel)
+        wheel = (
+            "Filter wheels: open, a neutral filter that passes 0.1 (NF1) or 0.01 (NF2), "
+            "or a curve. " + FILTER_NOTE.replace("This filter is", "Those marked * are")
+        )
+        self.wheel1 = ComboBox(choices=_filters(scene.observation), tooltip=wheel)
+        self.wheel2 = ComboBox(choices=_filters(scene.observation), tooltip=wheel)
         self.exposure = NumberField(
             "exposure",
             scene.observation.exposure,
@@ -51,10 +61,15 @@ class InstrumentForm(Form):
         )
         self.new_noise = PushButton(text="&New noise", tooltip="Draw the noise anew (next seed)")
         self.add("&Channel", self.channel)
+        self.sky_model = ComboBox(
+            choices=_skies(scene.observation),
+            tooltip="Sky: the paper's constants (CIS), HST's levels, or that of a high orbit",
+        )
         self.add("Wheels &1, 2", self.wheel1, self.wheel2)
         self.add("E&xposure (s)", self.exposure)
         self.add("Frame (px)", self.frame)
         self.add("Noise seed", self.seed, self.new_noise)
+        self.add("Sky", self.sky_model)
         self.sky = self.add_text("Background with the filters in place, by parts")
         self.psf = self.add_text(PSF_NOTE)
         self.warning = self.add_text("Limits of HST ACS/SBC, the nearest analogue")
@@ -62,7 +77,8 @@ class InstrumentForm(Form):
         self._shown: tuple[float, int] = (scene.observation.exposure, scene.seed)
         self.show_observation()
         self.show_warnings()
-        self.channel.changed.connect(lambda name: self._apply(channel=name))
+        self.channel.changed.connect(self._apply_channel)
+        self.sky_model.changed.connect(lambda sky: self._apply(sky=sky))
         for wheel_box in (self.wheel1, self.wheel2):
             wheel_box.changed.connect(self._apply_filters)
         self.frame.changed.connect(lambda shape: self._apply(shape=shape))
@@ -89,8 +105,17 @@ class InstrumentForm(Form):
         if set(self.frame.choices) != {shape for _, shape in _frames(observation.shape)}:
             with self.frame.changed.blocked():
                 self.frame.choices = _frames(observation.shape)
+        for widget, choices in (
+            (self.wheel1, _filters(observation)),
+            (self.wheel2, _filters(observation)),
+            (self.sky_model, _skies(observation)),
+        ):
+            if tuple(widget.choices) != tuple(value for _, value in choices):
+                with widget.changed.blocked():
+                    widget.choices = choices
         for widget, value in (
             (self.channel, observation.channel),
+            (self.sky_model, observation.sky),
             (self.wheel1, observation.filters[0]),
             (self.wheel2, observation.filters[1]),
             (self.frame, observation.shape),
@@ -125,8 +150,40 @@ class InstrumentForm(Form):
             show_error(str(error))
         self.show_observation()
 
+    def _apply_channel(self, channel: str) -> None:
+        """Change the channel; a filter that passes nothing of it is taken out of its wheel."""
+        filters = tuple(
+            one if _passes(channel, one) else "open" for one in self.scene.observation.filters
+        )
+        self._apply(channel=channel, filters=filters)
+
     def _apply_filters(self, event: Any = None) -> None:
-        self._apply(filters=(self.wheel1.value, self.wheel2.value))
+        chosen = [self.wheel1.value, self.wheel2.value]
+        if LOAD in chosen:
+            loaded = self._load_filter()
+            if loaded is None:
+                self.show_observation()
+                return
+            chosen[chosen.index(LOAD)] = loaded
+        self._apply(filters=tuple(chosen))
+
+    def _load_filter(self) -> Filter | None:
+        """Ask for a file with a filter's curve and read it; None, after a message, if it fails."""
+        path = self.ask_path()
+        if path is None:
+            return None
+        try:
+            return Filter.read(path)
+        except (OSError, ValueError) as error:
+            show_error(str(error))
+            return None
+
+    def ask_path(self) -> str | None:
+        """Ask for the file of a filter; None if the user changed his mind."""
+        path, _ = QFileDialog.getOpenFileName(
+            self, "Curve of a filter", "", "Tables of wavelength and transmission (*)"
+        )
+        return path or None
 
     def _apply_exposure(self) -> None:
         if (exposure := _valid(self.exposure)) is not None:
@@ -167,6 +224,34 @@ def _frames(shape: tuple[int, int]) -> list[tuple[str, tuple[int, int]]]:
     return [(f"{nx} × {ny} ({nx * PIXEL_SCALE:.1f}″)", (ny, nx)) for ny, nx in sizes]
 
 
+@lru_cache(maxsize=256)
+def _passes(channel: str, one: str | Filter) -> bool:
+    """Whether a filter passes light of a channel."""
+    try:
+        Observation(channel=channel, filters=(one, "open"))
+    except ValueError:
+        return False
+    return True
+
+
+def _filters(observation: Observation) -> list[tuple[str, Any]]:
+    """Labels and values of the filters that pass light of the channel, and those in use."""
+    names = [name for name in FILTER_NAMES if _passes(observation.channel, name)]
+    filters: list[tuple[str, Any]] = [
+        (f"{name} *" if name in ILLUSTRATIVE_FILTERS else name, name) for name in names
+    ]
+    own = dict.fromkeys(one for one in observation.filters if isinstance(one, Filter))
+    return [*filters, *((one.name, one) for one in own), ("load a curve…", LOAD)]
+
+
+def _skies(observation: Observation) -> list[tuple[str, Any]]:
+    """Labels and values of the skies, and the one in use if a script made it."""
+    skies: list[tuple[str, Any]] = list(SKIES.items())
+    if observation.sky not in SKIES.values():
+        skies.append(("set by a script", observation.sky))
+    return skies
+
+
 def _sky_text(observation: Observation) -> str:
     total = f"Sky {observation.sky_rate:.2g} cps/px"
     counts = (
@@ -174,8 +259,5 @@ def _sky_text(observation: Observation) -> str:
     )
     if observation.background is not None:
         return f"{total}, set by a script; {counts}"
-    sky, passed = observation.channel_data.sky, observation.transmittance
-    return (
-        f"{total}: geocorona {sky.geocorona * passed:.2g}, earthshine and zodiacal light "
-        f"{sky.earthshine_and_zodiacal * passed:.2g}; {counts}"
-    )
+    parts = ", ".join(f"{name} {rate:.2g}" for name, rate in observation.sky_components.items())
+    return f"{total}: {parts}; {counts}"
