@@ -61,7 +61,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         tools.setContentsMargins(4, 0, 4, 0)
         self.undo = _tool("&Undo", self.scene.undo)
         self.redo = _tool("&Redo", self.scene.redo)
-        self.list = _tool("S&ources…", self.toggle_list)
+        self.list = _tool("S&ources", self.toggle_list)
         self.list.setToolTip("Show or hide the list of sources")
         self.png = QPushButton("PNG")
         self.png.setToolTip("Save the final image, the source model or RGBA data as a picture")
@@ -70,7 +70,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.keys.setToolTip("List the keys")
         for button in (self.undo, self.redo, self.list, self.png, self.keys):
             button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-            tools.addWidget(button)
+            tools.addWidget(button, 3 if button is self.list else 2)
         for keys, action in (
             (QKeySequence.StandardKey.Undo, self.scene.undo),
             (QKeySequence.StandardKey.Redo, self.scene.redo),
