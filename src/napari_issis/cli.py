@@ -12,7 +12,6 @@ from itertools import count
 from pathlib import Path
 from typing import NoReturn
 
-from astropy.coordinates import SkyCoord
 from astropy.table import QTable
 
 from . import __version__
@@ -22,6 +21,7 @@ from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .fits_header import psf_description
 from .fits_io import IMAGES
 from .fits_io import SUFFIXES as FITS_SUFFIXES
+from .frame_coordinates import read_position
 from .instrument import CHANNELS, FILTERS
 from .observation import Observation
 from .png import SCALES, write_png, write_source_png
@@ -162,7 +162,7 @@ def _simulate(words: list[str]) -> None:
         frame = options.frame
         changes["shape"] = (frame[0], frame[0]) if len(frame) == 1 else tuple(frame)
     if options.pointing is not None:
-        changes["pointing"] = _pointing(options.pointing)
+        changes["pointing"] = read_position(options.pointing)
     sources, observation, notes = load_scene_with_notes(options.scene, **changes)
     if options.catalogue is not None:
         catalogue = read_catalogue(options.catalogue, observation)
@@ -186,23 +186,6 @@ def _simulate(words: list[str]) -> None:
     if options.rgba is not None:
         write_rgba(options.rgba, counts, overwrite=overwrite)
         print(f"wrote {options.rgba}")
-
-
-def _pointing(text: str) -> SkyCoord:
-    """Parse a position such as ``22h40m30s +3d21m31s`` or, in degrees, ``340.1 3.36``."""
-    try:
-        ra, dec = (float(word) for word in text.split())
-    except ValueError:
-        try:
-            return SkyCoord(text, unit=("hourangle", "deg"))
-        except (ValueError, TypeError):
-            raise ValueError(
-                f'pointing is {text!r}; give two angles such as "22h40m30s +3d21m31s" or, in '
-                'degrees, "340.1 3.36".'
-            ) from None
-    if not -90 <= dec <= 90:
-        raise ValueError(f"pointing is {text!r}; its declination must be from -90 to 90 degrees.")
-    return SkyCoord(ra, dec, unit="deg")
 
 
 def _list_scenes(words: list[str]) -> None:

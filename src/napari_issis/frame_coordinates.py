@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from astropy.coordinates import SkyCoord
 from astropy.wcs import WCS
 from numpy.typing import ArrayLike, NDArray
 
@@ -86,3 +87,32 @@ def _separation(ra: Array, dec: Array, ra_0: float, dec_0: float) -> Array:
     half = np.sin((d - d_0) / 2) ** 2 + np.cos(d) * np.cos(d_0) * np.sin((a - a_0) / 2) ** 2
     separation: Array = np.degrees(2 * np.arcsin(np.sqrt(np.clip(half, 0, 1))))
     return separation
+
+
+def read_position(text: str) -> SkyCoord:
+    """Read a position on the sky that was typed.
+
+    Parameters
+    ----------
+    text : str
+        Right ascension and declination, such as ``22h40m30s +3d21m31s``, ``22:40:30 +3:21:31``
+        or, in degrees, ``340.1 3.36``.
+
+    Raises
+    ------
+    ValueError
+        If it is no position; the message says what one looks like.
+    """
+    try:
+        ra, dec = (float(word) for word in text.split())
+    except ValueError:
+        try:
+            return SkyCoord(text, unit=("hourangle", "deg"))
+        except (ValueError, TypeError):
+            raise ValueError(
+                f'pointing is {text!r}; give two angles such as "22h40m30s +3d21m31s" or, in '
+                'degrees, "340.1 3.36".'
+            ) from None
+    if not -90 <= dec <= 90:
+        raise ValueError(f"pointing is {text!r}; its declination must be from -90 to 90 degrees.")
+    return SkyCoord(ra, dec, unit="deg")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from astropy.coordinates import SkyCoord
 from napari.utils.notifications import notification_manager
 from npe2 import PluginManifest
 from qtpy.QtCore import QPoint, QPointF, Qt
@@ -470,3 +471,23 @@ def test_a_wrong_curve_leaves_the_wheel(scene, instrument, tmp_path, monkeypatch
         assert instrument.wheel1.value == "open"
         assert scene.observation.filters == ("open", "open")
     assert len(notification_manager.records) == 1
+
+
+def test_the_frames_place_on_the_sky(scene, instrument):
+    """Catches a position that is rounded because it was shown, and a wrong one that is taken."""
+    exact = SkyCoord(340.12612345678, 3.3586123456789, unit="deg")
+    scene.observation = SMALL.replace(pointing=exact, roll=12.5)
+    instrument.show_observation()
+    assert instrument.position.value == "22:40:30.270 +03:21:31.004"
+    enter(instrument.roll, "40")
+    assert scene.observation.roll == 40.0
+    assert scene.observation.pointing is exact or scene.observation.pointing.ra == exact.ra
+    enter(instrument.position, "340.1 95")
+    assert scene.observation.pointing.dec == exact.dec
+    assert "-90 to 90" in instrument.position.native.toolTip()
+    enter(instrument.position, "20h13m15s -60d30m10s")
+    assert scene.observation.pointing.ra.deg == pytest.approx(303.3125, abs=1e-9)
+    enter(instrument.position, " ")
+    assert scene.observation.pointing is None
+    scene.wait()
+    assert scene.exposure == simulate(few_sources(), SMALL.replace(roll=40.0))

@@ -16,6 +16,7 @@ from ..observation import Observation
 from ..sky import SKIES
 from .form import Form
 from .number_field import NumberField, SeedField
+from .position_field import PositionField
 from .scene import Scene
 
 # What the last entry of a wheel stands for.
@@ -56,6 +57,12 @@ class InstrumentForm(Form):
             choices=_frames((512, 512)),
             tooltip="Frame in pixels (and its width); the sources stay where they are",
         )
+        self.position = PositionField()
+        self.roll = NumberField(
+            "roll",
+            scene.observation.roll,
+            "Roll: position angle of the frame's +y axis, degrees from north through east",
+        )
         self.seed = SeedField(
             "seed", scene.seed, "Seed of the Poisson noise of the picture; takes effect with Enter"
         )
@@ -68,13 +75,20 @@ class InstrumentForm(Form):
         self.add("Wheels &1, 2", self.wheel1, self.wheel2)
         self.add("E&xposure (s)", self.exposure)
         self.add("Frame (px)", self.frame)
+        self.add("RA Dec, roll", self.position, self.roll)
         self.add("Noise seed", self.seed, self.new_noise)
         self.add("Sky", self.sky_model)
         self.sky = self.add_text("Background with the filters in place, by parts")
         self.psf = self.add_text(PSF_NOTE)
         self.warning = self.add_text("Limits of HST ACS/SBC, the nearest analogue")
         self.warning.setStyleSheet(WARNING_STYLE)
-        self._shown: tuple[float, int] = (scene.observation.exposure, scene.seed)
+        self._shown: tuple[Any, ...] = (
+            scene.observation.exposure,
+            scene.seed,
+            None,
+            scene.observation.roll,
+        )
+        self._position_text = ""
         self.show_observation()
         self.show_warnings()
         self.channel.changed.connect(self._apply_channel)
@@ -85,6 +99,8 @@ class InstrumentForm(Form):
         # What is being typed takes effect with Enter or when the field is left.
         self.exposure.native.editingFinished.connect(self._apply_exposure)
         self.seed.native.editingFinished.connect(self._apply_seed)
+        for field in (self.position, self.roll):
+            field.native.editingFinished.connect(self._apply_position)
         self.new_noise.changed.connect(self._draw_noise)
 
     def resume(self) -> None:
@@ -123,8 +139,18 @@ class InstrumentForm(Form):
             with widget.changed.blocked():
                 widget.value = value
         # What the user is typing, or has to correct, stays unless the value itself changed.
-        exposure, seed = self._shown
-        self._shown = observation.exposure, self.scene.seed
+        exposure, seed, pointing, roll = self._shown
+        self._shown = (
+            observation.exposure,
+            self.scene.seed,
+            observation.pointing,
+            observation.roll,
+        )
+        if pointing is not observation.pointing:
+            self.position.position = observation.pointing
+            self._position_text = self.position.value
+        if roll != observation.roll:
+            self.roll.number = observation.roll
         if exposure != observation.exposure:
             self.exposure.number = observation.exposure
         if seed != self.scene.seed:
@@ -189,6 +215,18 @@ class InstrumentForm(Form):
         if (exposure := _valid(self.exposure)) is not None:
             self._apply(exposure=exposure)
 
+    def _apply_position(self) -> None:
+        observation = self.scene.observation
+        pointing, roll = observation.pointing, _valid(self.roll)
+        # what is shown is rounded: it is taken only if it was typed
+        if self.position.value != self._position_text:
+            try:
+                pointing = self.position.position
+            except ValueError:
+                return
+        if roll is not None and (pointing is not observation.pointing or roll != observation.roll):
+            self._apply(pointing=pointing, roll=roll)
+
     def _apply_seed(self) -> None:
         if (seed := _valid(self.seed)) is not None:
             self.scene.seed = int(seed)
@@ -197,6 +235,7 @@ class InstrumentForm(Form):
     def apply_typed(self) -> None:
         """Take over what was typed and not confirmed yet, as before saving by a key."""
         self._apply_exposure()
+        self._apply_position()
         self._apply_seed()
 
     def _draw_noise(self, event: Any = None) -> None:
