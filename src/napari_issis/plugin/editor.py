@@ -245,7 +245,8 @@ class SourceEditor:
             if not view.layer.visible:
                 continue
             ends = np.sort([view.layer.world_to_data(end)[-2:] for end in (corner, opposite)], 0)
-            centres = view.read().reshape(len(view.source_id), -1, 2).mean(axis=1)
+            data = view.read()
+            centres = data.reshape(-1, 2) if data.ndim == 2 else data.mean(axis=1)
             inside = np.all((centres >= ends[0]) & (centres <= ends[1]), axis=1)
             view.layer.selected_data = set(np.flatnonzero(inside).tolist())
 

@@ -200,9 +200,8 @@ class SourceLayer:
             Its rows in the order of the layer's.
         """
         current = self.read()
-        moved = np.flatnonzero(
-            np.any((current != self._geometry).reshape(len(current), -1), axis=1)
-        )
+        differs = current != self._geometry
+        moved = np.flatnonzero(differs.any(axis=tuple(range(1, differs.ndim))))
         rows = places[moved]
         return rows, self.moved(table[rows], self._geometry[moved], current[moved])
 
