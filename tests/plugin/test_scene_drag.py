@@ -262,3 +262,18 @@ def test_a_scene_of_one_galaxy(viewer, mouse):
     alone.wait()
     assert alone.exposure == fresh(alone)
     assert vstack([alone.sources])["x"][0] == pytest.approx(20.0, abs=1e-4)
+
+
+def test_an_image_made_anew_leaves_the_mouse_alone(scene, mouse, qtbot):
+    """Catches a drag that never ends: the release went to the image that a picture made anew."""
+    scene.viewer.layers.remove(scene.counts.layer)
+    mouse.press(40.0, 30.0)
+    mouse.move(42.0, 31.0)
+    mouse.move(50.0, 37.5)
+    qtbot.waitUntil(lambda: scene.counts.layer is not None, timeout=5000)
+    assert scene.viewer.layers.selection.active is scene.editor.ellipses.layer
+    mouse.release(50.0, 37.5)
+    scene.wait()
+    assert scene.editor.held is None
+    assert row(scene, 2)[:2] == pytest.approx([50.0, 37.5], abs=1e-4)
+    assert scene.exposure == fresh(scene)

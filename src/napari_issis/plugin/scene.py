@@ -375,6 +375,7 @@ class Scene:
         """Make the layers that are missing: the image lowest, the points uppermost."""
         layers = self.viewer.layers
         new = not self.layers
+        selected, active = set(layers.selection), layers.selection.active
         if new:
             self._orient()
         if self.counts.layer is None:
@@ -394,6 +395,11 @@ class Scene:
                     self._bind_keys(view.layer)
         if new:
             self.viewer.reset_view(layers=[self.counts.layer])
+        elif active is not None and layers.selection.active is not active:
+            # napari makes a new layer the active one; the mouse may be dragging in another
+            layers.selection.clear()
+            layers.selection.update(selected)
+            layers.selection.active = active
 
     def _bind_keys(self, layer: Any) -> None:
         """Bind our keys on a layer of ours: those of the viewer belong to the user."""
