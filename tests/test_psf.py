@@ -1,5 +1,7 @@
 """PSFs: transfer functions against real space, and bad parameters."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from astropy.io import fits
@@ -60,6 +62,57 @@ def test_band_average_is_weighted_by_photons(k):
     values = [float(ni.TelescopePSF(1.7, 0.33, float(w)).otf(k)) * w for w in wavelength[::40]]
     expected = integrate.simpson(values, x=wavelength[::40]) / (0.5 * (high**2 - low**2))
     assert ni.TelescopePSF(1.7, 0.33, (low, high)).otf(k) == pytest.approx(expected, abs=3e-7)
+
+
+def annular_overlap(obscuration, nu):
+    """Normalised area common to two annuli 2 nu apart: circular segments."""
+
+    def lens(big, small, d):
+        if d >= big + small:
+            return 0.0
+        if d <= big - small:
+            return np.pi * small**2
+        area = 0.0
+        for one, other in ((big, small), (small, big)):
+            angle = np.arccos((d**2 + one**2 - other**2) / (2 * d * one))
+            area += one**2 * (angle - np.sin(angle) * np.cos(angle))
+        return area
+
+    e, d = obscuration, 2 * nu
+    area = lens(1, 1, d) - (2 * lens(1, e, d) - lens(e, e, d) if e else 0.0)
+    return area / (np.pi * (1 - e**2))
+
+
+@pytest.mark.parametrize("ratio", [1.05, 1.5, 3.0])
+@pytest.mark.parametrize("obscuration", [0.0, 0.1, 0.25, 1 / 3, 0.35, 0.5, 0.8])
+def test_band_average_close_to_its_kinks(obscuration, ratio):
+    """Against adaptive quadrature between the kinks, to 5e-11.
+
+    Catches a spline that rings because two knots nearly coincide, a kink without a knot, and
+    knots too far apart where the fourth derivative is infinite.
+    """
+    kinks = {1.0, obscuration, (1 - obscuration) / 2, (1 + obscuration) / 2} - {0.0}
+
+    def mean(k):
+        edges = sorted({1.0, ratio} | {c / k for c in kinks if 1 < c / k < ratio})
+
+        def integrand(t, low, high):  # slow at both ends, where there are powers of 3/2
+            wavelength = low + (high - low) * t**2 * (3 - 2 * t)
+            slope = (high - low) * 6 * t * (1 - t)
+            return slope * wavelength * annular_overlap(obscuration, k * wavelength)
+
+        pieces = [
+            integrate.quad(integrand, 0, 1, args=ends, epsabs=1e-14, epsrel=1e-13)[0]
+            for ends in pairwise(edges)
+        ]
+        return sum(pieces) / (0.5 * (ratio**2 - 1))
+
+    low = 2000.0
+    psf = ni.TelescopePSF(1.7, obscuration, (low, low * ratio))
+    corners = {c / r for c in kinks for r in (1, ratio)}
+    near = [-1e-3, -6e-5, -4e-6, 0.0, 1e-7, 2e-5, 6e-5, 1e-4]
+    for k in [1e-4, 0.07, *(c + d for c in corners for d in near if c + d < 1)]:
+        assert psf.otf(k * psf.cutoff()) == pytest.approx(mean(k), rel=0, abs=5e-11)
 
 
 def test_default_psfs_are_a_tenth_of_an_arcsecond():

@@ -10,6 +10,11 @@ from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
+# of the spline of a band-averaged OTF: distance from a kink within which knots crowd, and the
+# least distance between two knots; both over the highest cut-off
+CROWD = 5e-3
+APART = 2.0**-23
+
 
 def annular_otf(nu: ArrayLike, obscuration: float) -> Array:
     """OTF of an annular aperture at frequencies nu, in units of the cut-off.
@@ -58,8 +63,11 @@ def band_averaged_otf(obscuration: float, ratio: float) -> CubicSpline:
     kinks = np.array([1.0, obscuration, (1 - obscuration) / 2, (1 + obscuration) / 2])
     kinks = kinks[kinks > 0]
     corners = np.concatenate([kinks, kinks / ratio])
-    # knots crowd where the mean itself has its (weaker) kinks
-    k = np.unique(np.concatenate([np.linspace(0, 1, 6001), corners]))
+    # knots crowd where the mean itself has its kinks, of the power 5/2
+    crowd = corners[:, None] + CROWD * np.linspace(-1, 1, 121) * np.abs(np.linspace(-1, 1, 121))
+    k = np.concatenate([np.linspace(0, 1, 6001), crowd.ravel()])
+    # two knots at nearly one place would spoil the spline: its slope between them is rounding
+    k = APART * np.unique(np.rint(k[(k >= 0) & (k <= 1)] / APART))
     x, w = np.polynomial.legendre.leggauss(20)
     s = 0.5 * (x + 1)
     smooth, slope = s**2 * (3 - 2 * s), 6 * s * (1 - s) * 0.5 * w
