@@ -28,12 +28,8 @@ def brightest_pixels(
     Half of a source's distance from the frame is given to its own outskirts, the other half to
     the PSF's wings.
     """
-    outside = [
-        np.maximum(np.maximum(-p, p - (n - 1)), 0.0)
-        for p, n in zip((sources.y, sources.x), shape, strict=True)
-    ]
     is_point = sources.kind == "point"
-    distance = np.where(is_point, 1.0, 0.5) * np.hypot(*outside)
+    distance = np.where(is_point, 1.0, 0.5) * away(shape, sources)
     bound = rate * psf_beyond(optics, distance)
     ratio = 1 - sources.ellipticity
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
@@ -46,6 +42,16 @@ def brightest_pixels(
     reached = disc & (distance <= np.sqrt(2) * sources.r_half)
     bound[reached] += rate[reached] / (2 * np.pi * sources.r_half[reached] ** 2 * ratio[reached])
     return bound
+
+
+def away(shape: tuple[int, int], sources: SourceArrays) -> Array:
+    """Distances in pixels of the sources' centres from the nearest pixel's, shape (n,)."""
+    outside = [
+        np.maximum(np.maximum(-p, p - (n - 1)), 0.0)
+        for p, n in zip((sources.y, sources.x), shape, strict=True)
+    ]
+    distance: Array = np.hypot(*outside)
+    return distance
 
 
 def psf_beyond(optics: Optics, distance: Array) -> Array:
