@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..observation import Observation
 from ..psf import RadialPSF
 from ..sources import SourceArrays, check_sources
-from .bounds import away, brightest_pixels, psf_beyond, unseen
+from .bounds import brightest_pixels, outside, psf_beyond, unseen
 from .direct import add_direct, has_sharp_edge
 from .gaussians import NODES, decompose
 from .meshes import LARGEST_DISC, mesh_rate
@@ -130,14 +130,23 @@ def _render(
         optics, 0.1 * allowed / brightest, optics.extent + 50.0, optics.point_area
     )
     strength = _ring_strength(optics, sources, rate)
-    ringing = ~unseen(strength * psf_beyond(optics, away(shape, sources)), 0.05 * allowed)
+    # the rings of a disc go out from its edge
+    edge = np.where(is_disc, np.sqrt(2) * sources.r_half, 0.0)
+    beyond = outside(shape, sources)
+    clear = np.maximum(np.hypot(*beyond) - edge, 0.0)
+    ringing = ~unseen(strength * psf_beyond(optics, clear), 0.05 * allowed)
+
+    def distances(reach: float) -> tuple[float, tuple[float, float]]:
+        near = ~is_point | (np.maximum(*beyond) <= reach)
+        rings = _distances(sources.take(near & ringing), shape)
+        return float(np.hypot(*rings)), _distances(sources.take(near), shape)
+
     plan = make_plan(
         optics,
         shape,
         allowed / brightest,
         _ring_accuracy(optics, sources, strength, allowed),
-        float(np.hypot(*_distances(sources.take(ringing), shape))),
-        _distances(sources, shape),
+        distances,
         int(is_point.sum()),
         int((~is_point).sum()),
         sharp_edge,
@@ -176,9 +185,7 @@ def _ring_strength(optics: Optics, sources: SourceArrays, rate: Array) -> Array:
     return strength
 
 
-def _ring_accuracy(
-    optics: Optics, sources: SourceArrays, strength: Array, allowed: float
-) -> float:
+def _ring_accuracy(optics: Optics, sources: SourceArrays, strength: Array, allowed: float) -> float:
     """Error allowed in the diffraction rings over the peak of the source that has the strongest.
 
     Rings of neighbours add up at random: the number of equally strong ones that are about as

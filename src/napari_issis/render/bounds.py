@@ -29,7 +29,7 @@ def brightest_pixels(
     the PSF's wings.
     """
     is_point = sources.kind == "point"
-    distance = np.where(is_point, 1.0, 0.5) * away(shape, sources)
+    distance = np.where(is_point, 1.0, 0.5) * np.hypot(*outside(shape, sources))
     bound = rate * psf_beyond(optics, distance)
     ratio = 1 - sources.ellipticity
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
@@ -44,14 +44,12 @@ def brightest_pixels(
     return bound
 
 
-def away(shape: tuple[int, int], sources: SourceArrays) -> Array:
-    """Distances in pixels of the sources' centres from the nearest pixel's, shape (n,)."""
-    outside = [
-        np.maximum(np.maximum(-p, p - (n - 1)), 0.0)
-        for p, n in zip((sources.y, sources.x), shape, strict=True)
-    ]
-    distance: Array = np.hypot(*outside)
-    return distance
+def outside(shape: tuple[int, int], sources: SourceArrays) -> tuple[Array, Array]:
+    """Distances (y, x) in pixels from the frame's outermost pixels to the sources outside."""
+    ny, nx = shape
+    y = np.maximum(np.maximum(-sources.y, sources.y - (ny - 1)), 0.0)
+    x = np.maximum(np.maximum(-sources.x, sources.x - (nx - 1)), 0.0)
+    return y, x
 
 
 def psf_beyond(optics: Optics, distance: Array) -> Array:
