@@ -336,7 +336,7 @@ def test_kernel_wraps_around_only_where_nobody_looks(seen):
     optics = Optics(TELESCOPE, PIXEL)
     farthest = float(np.hypot(*seen))
     shape = tuple(int(d) + 1 for d in seen)
-    plan = make_plan(optics, shape, 1e-10, 1e-11, farthest, seen, 100000, 0)
+    plan = make_plan(optics, shape, 1e-10, 1e-11, lambda reach: (farthest, seen), 100000, 0)
     assert plan.wraps
     low, high = -5.0, np.array(shape) + 4.0
     periods = [8 * int(np.ceil(plan.near_period(i, shape[i], low, high[i]) / 8)) for i in (0, 1)]
@@ -384,6 +384,22 @@ def test_rings_cross_the_frame(shape):
     for row, column in [(0, shape[1] - 1), (shape[0] - 1, shape[1] - 1)]:
         expected = count * 1e-14 * CPS * polar_rate(row - y, column - x)
         assert abs(image[row, column] - expected) <= 1e-11 * image.max()
+
+
+@pytest.mark.parametrize(("side", "distance"), [(24, 100), (24, 230), (60, 150)])
+def test_rings_of_a_bright_star_far_outside(side, distance):
+    """Several frame sides away from a small frame: its rings are the brightest errors.
+
+    Catches rings cut at a distance that goes by the frame's size and not by what is felt.
+    """
+    star = (side + distance + 0.3, 0.4 * side, 1e-10)
+    faint = (0.5 * side + 0.2, 0.3 * side, 1e-14)
+    table = vstack([ni.source("point", *one) for one in (star, faint)])
+    observation = ni.Observation(shape=(side, side), psf=TELESCOPE)
+    image = ni.count_rate(table, observation, tolerance=1e-7)
+    for row, column in [(side // 2, side - 1), (0, 0), (side - 1, side - 4)]:
+        expected = sum(f * CPS * polar_rate(row - y, column - x) for x, y, f in (star, faint))
+        assert abs(image[row, column] - expected) <= 1e-7 * image.max()
 
 
 def polar_rate(dy, dx):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..observation import Observation
 from ..psf import RadialPSF
 from ..sources import SourceArrays, check_sources
-from .bounds import brightest_pixels, unseen
+from .bounds import brightest_pixels, outside, psf_beyond, unseen
 from .direct import add_direct, has_sharp_edge
 from .gaussians import NODES, decompose
 from .meshes import LARGEST_DISC, mesh_rate
@@ -127,13 +127,24 @@ def _render(
     sharp_edge = has_sharp_edge(
         optics, 0.1 * allowed / brightest, optics.extent + 50.0, optics.point_area
     )
+    strength = _ring_strength(optics, sources, rate)
+    # the rings of a disc go out from its edge
+    edge = np.where(is_disc, np.sqrt(2) * sources.r_half, 0.0)
+    beyond = outside(shape, sources)
+    clear = np.maximum(np.hypot(*beyond) - edge, 0.0)
+    ringing = ~unseen(strength * psf_beyond(optics, clear), 0.05 * allowed)
+
+    def distances(reach: float) -> tuple[float, tuple[float, float]]:
+        near = ~is_point | (np.maximum(*beyond) <= reach)
+        rings = _distances(sources.take(near & ringing), shape)
+        return float(np.hypot(*rings)), _distances(sources.take(near), shape)
+
     plan = make_plan(
         optics,
         shape,
         allowed / brightest,
-        _ring_accuracy(optics, sources, rate, allowed),
-        float(np.hypot(*_distances(sources, shape, near_by=True))),
-        _distances(sources, shape),
+        _ring_accuracy(optics, sources, strength, allowed),
+        distances,
         int(is_point.sum()),
         int((~is_point).sum()),
         sharp_edge,
@@ -156,15 +167,11 @@ def _render(
     return image
 
 
-def _ring_accuracy(optics: Optics, sources: SourceArrays, rate: Array, allowed: float) -> float:
-    """Error allowed in the diffraction rings over the peak of the source that has the strongest.
-
-    Rings of neighbours add up at random: the number of equally strong ones that are about as
-    far away is taken from the fullest of the squares into which the field is divided.
-    """
+def _ring_strength(optics: Optics, sources: SourceArrays, rate: Array) -> Array:
+    """Rates of the point sources that have as strong diffraction rings, shape (n,)."""
     psf = optics.psf
     if not isinstance(psf, RadialPSF) or psf.first_edge() == np.inf:
-        return np.inf
+        return np.zeros_like(rate)
     ratio = 1 - sources.ellipticity
     q = 2 * np.pi * sources.r_half * ratio * psf.first_edge() * optics.pixel_scale
     strength = rate.copy()
@@ -173,6 +180,15 @@ def _ring_accuracy(optics: Optics, sources: SourceArrays, rate: Array, allowed: 
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
         chosen = sources.index == n
         strength[chosen] *= sersic_transform(float(n), q[chosen])
+    return strength
+
+
+def _ring_accuracy(optics: Optics, sources: SourceArrays, strength: Array, allowed: float) -> float:
+    """Error allowed in the diffraction rings over the peak of the source that has the strongest.
+
+    Rings of neighbours add up at random: the number of equally strong ones that are about as
+    far away is taken from the fullest of the squares into which the field is divided.
+    """
     strongest = float(strength.max())
     if strongest <= 0:
         return np.inf
@@ -182,19 +198,13 @@ def _ring_accuracy(optics: Optics, sources: SourceArrays, rate: Array, allowed: 
     return float(allowed * optics.point_area / (strongest * 3 * (1 + np.sqrt(neighbours))))
 
 
-def _distances(
-    sources: SourceArrays, shape: tuple[int, int], *, near_by: bool = False
-) -> tuple[float, float]:
-    """Largest distances (y, x) in pixels between a source and a pixel.
-
-    ``near_by`` brings sources that are far away closer.
-    """
+def _distances(sources: SourceArrays, shape: tuple[int, int]) -> tuple[float, float]:
+    """Largest distances (y, x) in pixels between a source and a pixel."""
     half = np.sqrt(2) * np.minimum(sources.r_half, LARGEST_DISC)
     half[sources.kind == "point"] = 0.0
     distances = []
     for p, n in zip((sources.y, sources.x), shape, strict=True):
-        at = np.clip(p, -n, 2 * n) if near_by else p
-        distances.append(float((np.maximum(at, n - 1 - at) + half).max()))
+        distances.append(float((np.maximum(p, n - 1 - p) + half).max(initial=0.0)))
     return distances[0], distances[1]
 
 

@@ -28,12 +28,8 @@ def brightest_pixels(
     Half of a source's distance from the frame is given to its own outskirts, the other half to
     the PSF's wings.
     """
-    outside = [
-        np.maximum(np.maximum(-p, p - (n - 1)), 0.0)
-        for p, n in zip((sources.y, sources.x), shape, strict=True)
-    ]
     is_point = sources.kind == "point"
-    distance = np.where(is_point, 1.0, 0.5) * np.hypot(*outside)
+    distance = np.where(is_point, 1.0, 0.5) * np.hypot(*outside(shape, sources))
     bound = rate * psf_beyond(optics, distance)
     ratio = 1 - sources.ellipticity
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
@@ -46,6 +42,14 @@ def brightest_pixels(
     reached = disc & (distance <= np.sqrt(2) * sources.r_half)
     bound[reached] += rate[reached] / (2 * np.pi * sources.r_half[reached] ** 2 * ratio[reached])
     return bound
+
+
+def outside(shape: tuple[int, int], sources: SourceArrays) -> tuple[Array, Array]:
+    """Distances (y, x) in pixels from the frame's outermost pixels to the sources outside."""
+    ny, nx = shape
+    y = np.maximum(np.maximum(-sources.y, sources.y - (ny - 1)), 0.0)
+    x = np.maximum(np.maximum(-sources.x, sources.x - (nx - 1)), 0.0)
+    return y, x
 
 
 def psf_beyond(optics: Optics, distance: Array) -> Array:

@@ -15,6 +15,7 @@ nothing wraps around. This is multilevel summation (Skeel, Tezcan & Hardy 2002, 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -31,6 +32,9 @@ Array = NDArray[np.float64]
 BAND = 0.35
 # the same for the fine mesh, whose result is only wanted at the pixels
 NEAR_BAND = 0.42
+# Natural logarithm of the accuracy over the rounding errors of a transform, which the fine mesh
+# may reach: taking back the spreading amplifies them.
+ROUNDING = 44.0
 # the fine mesh's period is a multiple of this many pixels
 NEAR_UNIT = 8
 # rings are cut at multiples of this distance in pixels, so that filters are shared
@@ -94,7 +98,10 @@ class Plan:
     @property
     def near_cell(self) -> float:
         """Cell of the fine mesh in pixels: a multiple of it is a pixel, and FFTs are quick."""
-        least = int(np.ceil(NEAR_UNIT * self.highest / NEAR_BAND))
+        # at the highest frequency rounding grows by exp(digits band^2 / (1 - 2 band))
+        room = ROUNDING / self.digits - 1
+        band = min(NEAR_BAND, np.sqrt(room**2 + room) - room)
+        least = int(np.ceil(NEAR_UNIT * self.highest / band))
         return NEAR_UNIT / int(fft.next_fast_len(least, real=True))
 
     def near_spread(self) -> float:
@@ -177,6 +184,15 @@ class Plan:
         """Distance in pixels at which a level's rings have been cut."""
         return self.ring_begin(level) + 2 * self.ring_fade * fading(self.optics)
 
+    def ringing(self) -> list[int]:
+        """Levels whose kernels have rings."""
+        return [j for j in range(-1 if self.near else 0, 3) if self._has_rings(j)]
+
+    def rings_end(self) -> float:
+        """Distance in pixels to which any level's kernel is felt that has rings or is finest."""
+        levels = {*self.ringing(), -1 if self.near else 0}
+        return max(self.reach(j) for j in levels)
+
     def _without_rings(self, level: int) -> float:
         # the filter's edge has the transform exp(-pi^2 width^2 r^2)
         reach = np.sqrt(self.digits) / (np.pi * self._width(level + 1))
@@ -198,8 +214,7 @@ def make_plan(
     shape: tuple[int, int],
     accuracy: float,
     ring_accuracy: float,
-    farthest: float,
-    seen: tuple[float, float],
+    distances: Callable[[float], tuple[float, tuple[float, float]]],
     points: int,
     extended: int,
     sharp_edge: bool = False,
@@ -217,10 +232,10 @@ def make_plan(
         Error allowed over the brightest source's peak.
     ring_accuracy : float
         Error allowed in the rings over the peak of the source that has the strongest.
-    farthest : float
-        Largest distance in pixels between a pixel and a source whose rings matter.
-    seen : (float, float)
-        Largest distances in pixels, along y and x, between a pixel and any source.
+    distances : callable
+        Takes how far outside the frame sources may be felt, in pixels, and returns the largest
+        distance between a pixel and one of those whose rings matter, and the largest distances
+        along y and x between a pixel and any of those.
     points, extended : int
         Numbers of sources.
     sharp_edge : bool
@@ -238,13 +253,17 @@ def make_plan(
         return Plan(optics, digits, 0.0, max(cell, 1.0), near="stamps")
     if highest <= BAND:
         cell = 2.0 ** np.floor(np.log2(BAND / highest))
-        wide = _with_rings_cut(Plan(optics, digits, ring_digits, cell, near=""), farthest)
+        wide = Plan(optics, digits, ring_digits, cell, near="")
+        farthest, _ = distances(wide.rings_end())
+        wide = _with_rings_cut(wide, farthest)
         if wide.highest <= BAND / cell:
             return wide
         if cell > 1:
             wide = Plan(optics, digits, ring_digits, cell / 2, near="")
             return _with_rings_cut(wide, farthest)
-    mesh = _with_rings_cut(Plan(optics, digits, ring_digits, 1.0, near="mesh"), farthest)
+    mesh = Plan(optics, digits, ring_digits, 1.0, near="mesh")
+    farthest, seen = distances(mesh.rings_end())
+    mesh = _with_rings_cut(mesh, farthest)
     stamps = replace(mesh, near="stamps")
     shorter = any(2 * d < n + mesh.reach(-1) for d, n in zip(seen, shape, strict=True))
     if shorter and mesh._has_rings(-1) and not meshes_only:
@@ -259,7 +278,7 @@ def make_plan(
 def _with_rings_cut(plan: Plan, farthest: float, *, always: bool = False) -> Plan:
     """Cut the rings of a plan, by default only if they reach further than needed."""
     cut = RING_STEP * float(np.ceil(farthest / RING_STEP))
-    levels = [j for j in range(-1 if plan.near else 0, 3) if plan._has_rings(j)]
+    levels = plan.ringing()
     faded = all(_ring_reach(plan, j) <= max(cut, plan._without_rings(j)) for j in levels)
     if faded and not always:
         return plan
