@@ -369,7 +369,8 @@ def test_the_docks_lie_beside_the_canvas(window, npe2pm):
     assert places == sorted(places)
     assert places[0] + canvas.width() <= places[1]
     assert row.mapTo(main, QPoint(0, 0)).y() >= canvas.mapTo(main, QPoint(0, canvas.height())).y()
-    assert canvas.width() > 350
+    # the traces take little of it: fonts and styles of the machine move a few pixels
+    assert canvas.width() > 2 * column.width()
     assert column.plot.height() > 0.9 * canvas.height()
     viewer.window.remove_dock_widget(find_dock(row))
     assert main.corner(Qt.Corner.BottomRightCorner) != right
