@@ -68,6 +68,47 @@ def test_the_image_that_stands_first(tmp_path, image, compress, whole):
             Exposure.read(tmp_path / "x.fits")
 
 
+@pytest.mark.parametrize("dtype", ["int32", "int64", "float32", "float64"])
+@pytest.mark.parametrize("image", IMAGES)
+def test_the_numbers_of_the_image_can_be_chosen(tmp_path, image, dtype, compress):
+    """Catches other numbers than asked for, and an exposure read back from the rounded ones."""
+    path = tmp_path / "x.fits"
+    if image != "counts" and dtype.startswith("int"):
+        with pytest.raises(ValueError, match="would round .* use float32 or float64"):
+            EXPOSURE.write(path, image=image, dtype=dtype, compress=compress)
+        assert not path.exists()
+        return
+    EXPOSURE.write(path, image=image, dtype=dtype, compress=compress)
+    with warnings.catch_warnings(), fits.open(path, checksum=True) as hdus:
+        warnings.simplefilter("error")
+        first = hdus[1 if compress else 0]
+        assert first.data.dtype.newbyteorder("=") == np.dtype(dtype)
+        assert np.array_equal(first.data, np.asarray(IMAGES[image][0]).astype(dtype))
+        assert first.header["BUNIT"] == IMAGES[image][1]
+        assert len({hdu.name for hdu in hdus}) == len(hdus)
+        hdus.verify("exception")
+    back = Exposure.read(path)
+    assert back == EXPOSURE
+    assert back.expected.tobytes() == EXPOSURE.expected.tobytes()
+
+
+@pytest.mark.parametrize(("dtype", "most"), [("int32", 2**31 - 1), ("float32", 2**24)])
+def test_counts_are_never_rounded(tmp_path, dtype, most):
+    """Catches counts that wrap around, or lose their last digit, in silence."""
+    for brightest, fine in ((most, True), (most + 1, False)):
+        counts = np.full(SHAPE, brightest)
+        exposure = Exposure(counts, EXPOSURE.expected, EXPOSURE.sources, OBSERVATION, 7)
+        path = tmp_path / f"{brightest}.fits"
+        if fine:
+            exposure.write(path, dtype=dtype)
+            assert fits.getdata(path).max() == brightest
+        else:
+            with pytest.raises(ValueError, match=f"{brightest}; use int64"):
+                exposure.write(path, dtype=dtype)
+    with pytest.raises(ValueError, match="dtype is 'int8'; known: int32, int64"):
+        EXPOSURE.write(tmp_path / "x.fits", dtype="int8")
+
+
 def test_an_unknown_image(tmp_path):
     with pytest.raises(ValueError, match="image is 'flux'; known: counts, rate, expected, snr"):
         EXPOSURE.write(tmp_path / "x.fits", image="flux")

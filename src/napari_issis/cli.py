@@ -19,7 +19,7 @@ from .catalogue import read_catalogue
 from .exposure import Exposure, simulate
 from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .fits_header import psf_description
-from .fits_io import IMAGES
+from .fits_io import DTYPES, IMAGES
 from .fits_io import SUFFIXES as FITS_SUFFIXES
 from .frame_coordinates import read_position
 from .instrument import CHANNELS, FILTERS
@@ -141,6 +141,7 @@ def _simulate(words: list[str]) -> None:
         default="counts",
         help="image that stands first in the FITS file; default: counts",
     )
+    parser.add_argument("--dtype", choices=DTYPES, help="numbers of that image")
     parser.add_argument("--rgba", metavar="X.png", help="counts as red + 256 green + 65536 blue")
     parser.add_argument("--model", metavar="X.png", help="picture of the sources to write as well")
     parser.add_argument("--zoom", type=int, default=1, help="magnification of both pictures")
@@ -171,7 +172,11 @@ def _simulate(words: list[str]) -> None:
         print(note)
     exposure = _expose(sources, observation, options.seed, options.tolerance)
     exposure.write(
-        options.output, overwrite=overwrite, compress=options.compress, image=options.image
+        options.output,
+        overwrite=overwrite,
+        compress=options.compress,
+        image=options.image,
+        dtype=options.dtype,
     )
     print(f"wrote {options.output}")
     counts, shape = exposure.counts, observation.shape

@@ -67,12 +67,21 @@ class Exposure:
         overwrite: bool = False,
         compress: bool = False,
         image: str = "counts",
+        dtype: str | None = None,
         whole: bool = True,
     ) -> None:
         """Write the exposure to a FITS file; see `napari_issis.fits_io.write_exposure`."""
         from .fits_io import write_exposure
 
-        write_exposure(self, path, overwrite=overwrite, compress=compress, image=image, whole=whole)
+        write_exposure(
+            self,
+            path,
+            overwrite=overwrite,
+            compress=compress,
+            image=image,
+            dtype=dtype,
+            whole=whole,
+        )
 
     @classmethod
     def read(cls, path: str | Path) -> Exposure:

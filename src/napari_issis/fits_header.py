@@ -6,7 +6,9 @@ from datetime import UTC, datetime
 from math import cos, radians, sin
 from typing import TYPE_CHECKING
 
+import numpy as np
 from astropy.io import fits
+from numpy.typing import ArrayLike
 
 from .filter_set import FILTER_NOTE, ILLUSTRATIVE_FILTERS
 from .filters import Filter
@@ -130,6 +132,49 @@ def wcs_header(observation: Observation) -> fits.Header:
     header["RADESYS"] = "ICRS"
     header["ROLL"] = (observation.roll, "[deg] position angle of the +y axis")
     header.update(_offsets(observation, "A"))
+    return header
+
+
+def layer_header(to_frame: ArrayLike, observation: Observation) -> fits.Header:
+    """World coordinates of an image that lies somewhere in the frame.
+
+    Parameters
+    ----------
+    to_frame : array_like, shape (3, 3)
+        ``to_frame @ [y, x, 1]`` is ``[y, x, 1]`` in the frame, both with (0, 0) at the centre of
+        the first pixel.
+    observation : Observation
+        The frame.
+
+    Returns
+    -------
+    astropy.io.fits.Header
+        The projection of `wcs_header`, exactly: before it both are linear.
+
+    Raises
+    ------
+    ValueError
+        If the image is flattened to a line.
+    """
+    matrix = np.asarray(to_frame, dtype=np.float64)
+    # FITS counts x before y.
+    linear, shift = matrix[1::-1, 1::-1], matrix[1::-1, 2]
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(linear)) < 1e-12:
+        raise ValueError(
+            "the image has no width or height in the frame; mend its scale, or save it in a "
+            "viewer without the scene."
+        )
+    header = wcs_header(observation)
+    header.remove("ROLL", ignore_missing=True)
+    for a in ("",) if observation.pointing is None else ("", "A"):
+        turn = [[header.get(f"PC{i}_{j}{a}", float(i == j)) for j in (1, 2)] for i in (1, 2)]
+        centre = np.array([header[f"CRPIX1{a}"], header[f"CRPIX2{a}"]]) - 1
+        own = np.linalg.solve(linear, centre - shift) + 1
+        turned = turn @ linear
+        for i in (1, 2):
+            header[f"CRPIX{i}{a}"] = float(own[i - 1])
+            for j in (1, 2):
+                header[f"PC{i}_{j}{a}"] = float(turned[i - 1, j - 1])
     return header
 
 

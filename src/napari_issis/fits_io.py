@@ -44,6 +44,8 @@ IMAGES = {
     "expected": ("ct", "expected counts per pixel, sources and sky"),
     "snr": ("", "signal-to-noise ratio per pixel, (C - B) / sqrt(C)"),
 }
+# Numbers of that image, and the counts up to which each holds every whole number.
+DTYPES = {"int32": 2**31 - 1, "int64": 2**63 - 1, "float32": 2**24, "float64": 2**53}
 
 
 def write_exposure(
@@ -53,6 +55,7 @@ def write_exposure(
     overwrite: bool = False,
     compress: bool = False,
     image: str = "counts",
+    dtype: str | None = None,
     whole: bool = True,
 ) -> None:
     """Write an exposure to a FITS file.
@@ -71,14 +74,18 @@ def write_exposure(
     image : {"counts", "rate", "expected", "snr"}
         The image that other programs see first: detected counts (integers), counts per
         second, expected counts, or the signal-to-noise ratio per pixel (64-bit floats).
+    dtype : {"int32", "int64", "float32", "float64"}, optional
+        Numbers of that image, where others than those above are wanted: counts as floats for
+        programs that take no integers, or half the bytes for the others. What `read_exposure`
+        needs stays exact beside it.
     whole : bool
         Whether all that `read_exposure` needs goes into the file, or the image alone.
 
     Raises
     ------
     ValueError
-        If the name does not end as above, the image is not one of these, or a column, the
-        PSF or the sky cannot be stored.
+        If the name does not end as above, the image or the dtype is not one of these, whole
+        counts would be rounded, or a column, the PSF or the sky cannot be stored.
     OSError
         If the file cannot be written; `FileExistsError` if it exists.
     """
@@ -86,15 +93,19 @@ def write_exposure(
         raise ValueError(f"image is {image!r}; known: {', '.join(IMAGES)}.")
     wcs = wcs_header(exposure.observation)
     cards = observation_header(exposure) + _unit(image) + wcs
-    first = _image_of(exposure, image)
+    exact = _image_of(exposure, image)
+    first = exact if dtype is None else _as_type(exact, image, dtype)
+    # An image of other numbers does not take the place of the one to be read back.
+    changed = first.dtype.kind != exact.dtype.kind or first.dtype.itemsize < exact.dtype.itemsize
     if compress:
-        hdus = [fits.PrimaryHDU(header=observation_header(exposure)), _packed(first, cards, image)]
+        name = "image" if changed else image
+        hdus = [fits.PrimaryHDU(header=observation_header(exposure)), _packed(first, cards, name)]
     else:
         hdus = [fits.PrimaryHDU(first, cards)]
     if whole:
         for name in ("counts", "expected"):
             # Uncompressed, the first image has no name to be found by; only counts need none.
-            if name == image and (compress or name == "counts"):
+            if name == image and (compress or name == "counts") and not changed:
                 continue
             further = _image_of(exposure, name)
             if compress and name == "counts":
@@ -158,6 +169,24 @@ def _image_of(exposure: Exposure, image: str) -> NDArray[Any]:
         return np.asarray(exposure.counts / exposure.observation.exposure)
     values = exposure.expected if image == "expected" else exposure.snr
     return np.asarray(values, dtype=np.float64)
+
+
+def _as_type(values: NDArray[Any], image: str, dtype: str) -> NDArray[Any]:
+    """Convert an image to the numbers asked for, unless whole counts would be rounded."""
+    if dtype not in DTYPES:
+        raise ValueError(f"dtype is {dtype!r}; known: {', '.join(DTYPES)}.")
+    whole = values.dtype.kind == "i"
+    if not whole and dtype.startswith("int"):
+        raise ValueError(
+            f"dtype is {dtype!r}, which would round the image {image!r}; use float32 or float64."
+        )
+    brightest = int(values.max(initial=0)) if whole else 0
+    if brightest > DTYPES[dtype]:
+        raise ValueError(
+            f"dtype is {dtype!r}, which holds whole counts up to {DTYPES[dtype]} only, and the "
+            f"brightest pixel has {brightest}; use int64."
+        )
+    return values.astype(dtype)
 
 
 def _unit(image: str) -> fits.Header:
