@@ -339,7 +339,7 @@ def test_an_exposure_as_the_scene_is_rendered_the_same(star):
 def test_further_files(star, capsys):
     """Catches an option that is parsed and then forgotten."""
     files = ["--rgba", "r.png", "--model", "m.png", "--png", "p.png"]
-    options = ["--zoom", "2", "--image", "snr", "--compress"]
+    options = ["--zoom", "2", "--image", "snr", "--dtype", "float32", "--compress"]
     main(["simulate", star, *FRAME, *files, *options, "--output", "x.fits"])
     exposure = Exposure.read("x.fits")
     np.testing.assert_array_equal(read_rgba("r.png"), exposure.counts)
@@ -347,7 +347,7 @@ def test_further_files(star, capsys):
         with Image.open(name) as image:
             assert image.size == (96, 80)
     with fits.open("x.fits") as hdus:
-        np.testing.assert_array_equal(hdus[1].data, exposure.snr)
+        np.testing.assert_array_equal(hdus[1].data, exposure.snr.astype("f4"))
     assert capsys.readouterr().out.count("wrote ") == 4
     again = ["simulate", star, "--output", "y.fits", "--rgba", "r.png"]
     assert "r.png exists already" in refused(capsys, *again)

@@ -74,7 +74,7 @@ def test_the_numbers_of_the_image_can_be_chosen(tmp_path, image, dtype, compress
     """Catches other numbers than asked for, and an exposure read back from the rounded ones."""
     path = tmp_path / "x.fits"
     if image != "counts" and dtype.startswith("int"):
-        with pytest.raises(ValueError, match="would round .* use float32 or float64"):
+        with pytest.raises(ValueError, match="use float32 or float64"):
             EXPOSURE.write(path, image=image, dtype=dtype, compress=compress)
         assert not path.exists()
         return

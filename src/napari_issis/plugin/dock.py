@@ -36,6 +36,17 @@ from .writer import fits_path
 
 DOCK_NAME = "ISSIS simulator"
 
+# The file types that the dialog offers, and what is written.
+FITS_FORMS: dict[str, dict[str, Any]] = {
+    "Whole exposure": {},
+    "Whole exposure, compressed": {"compress": True},
+    "Counts alone": {"whole": False},
+    "Counts alone, as floats": {"whole": False, "dtype": "float64"},
+    "Count rate alone": {"image": "rate", "whole": False},
+    "Expected counts alone": {"image": "expected", "whole": False},
+    "SNR alone": {"image": "snr", "whole": False},
+}
+
 
 class SimulatorWidget(QWidget):  # type: ignore[misc]
     """Controls of the live scene; makes one in its viewer if there is none.
@@ -54,9 +65,10 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         self.display = DisplayForm(self.scene)
         self.view = ViewForm(self.scene)
         self.save = PushButton(
-            text="Sav&e FITS…", tooltip="Save counts, expected counts and sources as a FITS file"
+            text="Sav&e FITS…", tooltip="Save the exposure as a FITS file: whole, or one image"
         )
         self.save.changed.connect(self.save_fits)
+        self.form = next(iter(FITS_FORMS))
         tools = QHBoxLayout()
         tools.setContentsMargins(4, 0, 4, 0)
         self.undo = _tool("&Undo", self.scene.undo)
@@ -109,7 +121,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         target = fits_path(path)
         try:
             # The dialog has asked before choosing a file that exists, by the name typed.
-            self.scene.exposure.write(target, overwrite=target == path)
+            self.scene.exposure.write(target, overwrite=target == path, **FITS_FORMS[self.form])
         except (OSError, ValueError, RuntimeError) as error:
             show_error(str(error))
         else:
@@ -131,10 +143,15 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
 
     def ask_path(self) -> str | None:
         """Ask for the file to write; None if the user changed his mind."""
-        dialog = QFileDialog(self, "Save exposure", "issis.fits", "FITS (*.fits)")
+        dialog = QFileDialog(self, "Save exposure", "issis.fits")
+        dialog.setNameFilters([f"{form} (*.fits)" for form in FITS_FORMS])
+        dialog.selectNameFilter(f"{self.form} (*.fits)")
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix("fits")
-        return dialog.selectedFiles()[0] if dialog.exec() else None
+        if not dialog.exec():
+            return None
+        self.form = dialog.selectedNameFilter().removesuffix(" (*.fits)")
+        return str(dialog.selectedFiles()[0])
 
     def showEvent(self, event: QShowEvent) -> None:
         """Follow the scene while visible (napari gives docked widgets no close event)."""
