@@ -10,6 +10,7 @@ from .drag import Drag
 from .exposure import Exposure, simulate
 from .filters import Filter
 from .image_psf import ImagePSF
+from .lensed_quasars import lensed_quasar, lensed_quasars
 from .limits import CountRateWarning
 from .observation import Observation
 from .populations import random_sources, star_cluster
@@ -61,6 +62,8 @@ __all__ = [
     "Sky",
     "TelescopePSF",
     "count_rate",
+    "lensed_quasar",
+    "lensed_quasars",
     "random_sources",
     "read_catalogue",
     "read_image",
