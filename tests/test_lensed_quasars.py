@@ -29,9 +29,7 @@ def independent_wcs(observation):
     wcs.wcs.crval = [observation.pointing.ra.deg, observation.pointing.dec.deg]
     wcs.wcs.crpix = [(nx + 1) / 2, (ny + 1) / 2]
     scale = 0.036 / 3600
-    wcs.wcs.cd = scale * np.array(
-        [[-np.cos(turn), np.sin(turn)], [np.sin(turn), np.cos(turn)]]
-    )
+    wcs.wcs.cd = scale * np.array([[-np.cos(turn), np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     return wcs
 
 
