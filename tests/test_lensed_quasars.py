@@ -9,28 +9,15 @@ import astropy.units as u
 import numpy as np
 import pytest
 from astropy.coordinates import SkyCoord
-from astropy.wcs import WCS
 
 import napari_issis as ni
+from independent_wcs import independent_wcs
 from napari_issis.lensed_quasars import find_quasar, quasar_library
 from napari_issis.sources import check_sources
 
 FILE = Path(ni.__file__).parent / "lensed_quasars.toml"
 SYSTEMS = tomllib.loads(FILE.read_text(encoding="utf-8"))["system"]
 RATIOS = {2: (1.0, 0.5), 4: (1.0, 0.5, 0.4, 0.3)}
-
-
-def independent_wcs(observation):
-    """The frame on the sky from four numbers, by none of the program's own code."""
-    ny, nx = observation.shape
-    turn = np.radians(observation.roll)
-    wcs = WCS(naxis=2)
-    wcs.wcs.ctype = ["RA---TAN", "DEC--TAN"]
-    wcs.wcs.crval = [observation.pointing.ra.deg, observation.pointing.dec.deg]
-    wcs.wcs.crpix = [(nx + 1) / 2, (ny + 1) / 2]
-    scale = 0.036 / 3600
-    wcs.wcs.cd = scale * np.array([[-np.cos(turn), np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    return wcs
 
 
 @pytest.mark.parametrize("entry", SYSTEMS, ids=lambda entry: entry["name"])

@@ -12,6 +12,7 @@ from .filters import Filter
 from .image_psf import ImagePSF
 from .lensed_quasars import lensed_quasar, lensed_quasars
 from .limits import CountRateWarning
+from .monitoring import Epoch, Monitoring, monitor
 from .observation import Observation
 from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
@@ -52,18 +53,21 @@ __all__ = [
     "ClusterProfile",
     "CountRateWarning",
     "Drag",
+    "Epoch",
     "Exposure",
     "Filter",
     "FitsImage",
     "GaussianPSF",
     "ImagePSF",
     "MoffatPSF",
+    "Monitoring",
     "Observation",
     "Sky",
     "TelescopePSF",
     "count_rate",
     "lensed_quasar",
     "lensed_quasars",
+    "monitor",
     "random_sources",
     "read_catalogue",
     "read_image",
