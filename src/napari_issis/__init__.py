@@ -10,6 +10,7 @@ from .drag import Drag
 from .exposure import Exposure, simulate
 from .filters import Filter
 from .image_psf import ImagePSF
+from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
 from .limits import CountRateWarning
 from .monitoring import Epoch, Monitoring, monitor
@@ -65,6 +66,7 @@ __all__ = [
     "Sky",
     "TelescopePSF",
     "count_rate",
+    "lens_images",
     "lensed_quasar",
     "lensed_quasars",
     "monitor",
