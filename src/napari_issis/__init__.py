@@ -10,7 +10,10 @@ from .drag import Drag
 from .exposure import Exposure, simulate
 from .filters import Filter
 from .image_psf import ImagePSF
+from .lens_model import lens_images
+from .lensed_quasars import lensed_quasar, lensed_quasars
 from .limits import CountRateWarning
+from .monitoring import Epoch, Monitoring, monitor
 from .observation import Observation
 from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
@@ -51,16 +54,22 @@ __all__ = [
     "ClusterProfile",
     "CountRateWarning",
     "Drag",
+    "Epoch",
     "Exposure",
     "Filter",
     "FitsImage",
     "GaussianPSF",
     "ImagePSF",
     "MoffatPSF",
+    "Monitoring",
     "Observation",
     "Sky",
     "TelescopePSF",
     "count_rate",
+    "lens_images",
+    "lensed_quasar",
+    "lensed_quasars",
+    "monitor",
     "random_sources",
     "read_catalogue",
     "read_image",

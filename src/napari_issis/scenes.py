@@ -1,4 +1,4 @@
-"""Built-in scenes: the three examples of the paper and a lensed quasar."""
+"""Built-in scenes: the three examples of the paper and lensed quasars."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .catalogue import PACKED_FITS, READABLE, read_catalogue
 from .fits_io import SUFFIXES as FITS_SUFFIXES
 from .fits_io import read_exposure
 from .fits_table import open_fits
-from .instrument import PIXEL_SCALE
+from .lensed_quasars import find_quasar, lensed_quasar
 from .observation import Observation
 from .populations import random_sources
 from .sources import source
@@ -86,50 +86,47 @@ def galaxies100() -> ExampleScene:
     )
 
 
-# Offsets from image A in arcsec, east and north: CASTLES.
-Q2237_IMAGES = MappingProxyType(
-    {"A": (0.0, 0.0), "B": (-0.673, 1.697), "C": (0.635, 1.210), "D": (-0.866, 0.528)}
-)
-Q2237_LENS = (-0.075, 0.939)
-# erg s-1 cm-2 A-1 at 2500 A: CASTLES F814W magnitudes 15.92, 17.21, 16.77, 17.39 (Vega)
-# carried on by a power law lambda^-1.5; no ultraviolet photometry was found.
-Q2237_FLUX = MappingProxyType({"A": 2.9e-15, "B": 8.7e-16, "C": 1.3e-15, "D": 7.4e-16})
-# ICRS, degrees, of the system; good to about an arcsec.
-Q2237_POINTING = (340.1258, 3.35855)
-
-
 def q2237() -> ExampleScene:
     """Make the lensed quasar Q2237+0305, the Einstein cross: images A, B, C, D, then the lens.
 
     The lens galaxy is at the frame's centre.
     """
-    shape = (256, 256)
+    return _lensed("q2237", "Q2237+0305")
 
-    def position(east: float, north: float) -> tuple[float, float]:
-        x = (shape[1] - 1) / 2 - (east - Q2237_LENS[0]) / PIXEL_SCALE
-        y = (shape[0] - 1) / 2 + (north - Q2237_LENS[1]) / PIXEL_SCALE
-        return x, y
 
-    lens = source(
-        "devaucouleurs", *position(*Q2237_LENS), flux=3e-15, r_half=40, ellipticity=0.3, pa=65
+def he0435() -> ExampleScene:
+    """Make the lensed quasar HE0435-1223: images A, B, C, D, then the lens at the centre."""
+    return _lensed("he0435", "HE0435-1223")
+
+
+def pg1115() -> ExampleScene:
+    """Make the lensed quasar PG1115+080: images A1, A2, B, C, then the lens at the centre."""
+    return _lensed("pg1115", "PG1115+080")
+
+
+def h1413() -> ExampleScene:
+    """Make the lensed quasar H1413+117: images A, B, C, D, then the lens at the centre."""
+    return _lensed("h1413", "H1413+117")
+
+
+def _lensed(name: str, quasar: str) -> ExampleScene:
+    system = find_quasar(quasar)
+    observation = Observation(
+        shape=(256, 256), pointing=SkyCoord(system.ra, system.dec, unit="deg"), exposure=1000.0
     )
-    images = [
-        source("point", *position(*Q2237_IMAGES[name]), flux=Q2237_FLUX[name])
-        for name in Q2237_IMAGES
-    ]
     return ExampleScene(
-        "q2237",
-        "Lensed quasar Q2237+0305: four images and the lens galaxy",
-        vstack([*images, lens]),
-        Observation(shape=shape, pointing=SkyCoord(*Q2237_POINTING, unit="deg"), exposure=1000.0),
-        "Positions: CASTLES. Illustrative: the quasar's fluxes (F814W magnitudes carried on to "
-        "2500 A by a power law lambda^-1.5, without extinction) and the lens galaxy's flux, "
-        "size, shape and angle.",
+        name,
+        f"Lensed quasar {quasar}: four images and the lens galaxy",
+        lensed_quasar(quasar, observation),
+        observation,
+        f"Positions: {system.references[0]}. Illustrative: the quasar's fluxes (F814W magnitudes "
+        "carried on to 2500 A by a power law lambda^-1.5, without extinction) and the lens "
+        "galaxy's flux, size, shape and angle.",
     )
 
 
 SCENES: Mapping[str, Callable[[], ExampleScene]] = MappingProxyType(
-    {make.__name__: make for make in (blend, stars500, galaxies100, q2237)}
+    {make.__name__: make for make in (blend, stars500, galaxies100, q2237, he0435, pg1115, h1413)}
 )
 
 

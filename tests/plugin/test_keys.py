@@ -193,7 +193,7 @@ def test_the_panel_shows_the_list_of_keys(window):
 
 @pytest.mark.needs_gl
 @pytest.mark.parametrize("page", [0, 1])
-@pytest.mark.parametrize("mode", ["specific", "random", "cluster"])
+@pytest.mark.parametrize("mode", ["specific", "random", "cluster", "lens"])
 def test_no_two_controls_have_one_letter(window, page, mode):
     """Catches Alt+U that goes to a field where it should undo."""
     panel = panel_of(window)

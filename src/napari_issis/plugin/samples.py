@@ -32,6 +32,21 @@ def q2237() -> list[LayerDataTuple]:
     return _sample("q2237")
 
 
+def he0435() -> list[LayerDataTuple]:
+    """Lensed quasar HE0435-1223."""
+    return _sample("he0435")
+
+
+def pg1115() -> list[LayerDataTuple]:
+    """Lensed quasar PG1115+080."""
+    return _sample("pg1115")
+
+
+def h1413() -> list[LayerDataTuple]:
+    """Lensed quasar H1413+117, the Cloverleaf."""
+    return _sample("h1413")
+
+
 def scene_layers(name: str) -> list[LayerDataTuple]:
     """Image, ellipses and points of a built-in scene as napari layer data."""
     scene = example_scene(name)

@@ -1,4 +1,4 @@
-"""The form that adds sources: one with given parameters, a random population, or a cluster."""
+"""The form that adds sources: a given one, a random population, a cluster, a lensed quasar."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
 from qtpy.QtWidgets import QWidget
 
+from ..lensed_quasars import lensed_quasar
 from ..populations import CLUSTER_FLUX, random_sources, star_cluster
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -23,6 +24,7 @@ from .cluster_rows import ClusterRows
 from .count_field import CountField
 from .flux_rows import FluxRows
 from .form import Field, Form
+from .lens_rows import LensRows
 from .limit_fields import Limits, QuantityLimits
 from .number_field import NumberField, SeedField
 from .quantity_field import QuantityField
@@ -39,6 +41,7 @@ MODES = (
     ("specific object", "specific"),
     ("random distribution", "random"),
     ("star cluster", "cluster"),
+    ("lensed quasar", "lens"),
 )
 FLUX_HELP = "Flux F, averaged over the channel, or AB magnitude"
 R_HELP = "Semi-major axis of the ellipse that holds half of the light (a pixel is 0.036″)"
@@ -95,7 +98,7 @@ class SourceForm(Form):
             choices=list(MODES),
             value="specific",
             tooltip="One source with these parameters, a random population over the frame, "
-            "or the stars of a cluster",
+            "the stars of a cluster, or a known lensed quasar",
         )
         self.kind = ComboBox(
             choices=[(KIND_TEXT.get(kind, kind), kind) for kind in KINDS],
@@ -145,13 +148,14 @@ class SourceForm(Form):
         self.add("&Mode", self.mode)
         self._add_row("&Kind", self.kind, modes="specific random")
         self._add_row("Num&ber", self.number, modes="random cluster")
-        self._add_row("x, y (px)", self.x, self.y, modes="specific cluster")
+        self._add_row("x, y (px)", self.x, self.y, modes="specific cluster lens")
         self._flux_row = self._add_row("F", self.flux, modes="specific")
         self._r_row = self._add_row("R½", self.r_half, modes="specific", kinds=EXTENDED)
         self._add_row("Ellipticity", self.ellipticity, modes="specific", kinds=EXTENDED)
         self._add_row("PA (°)", self.pa, modes="specific", kinds=EXTENDED)
         self._add_row("Sérsic n", self.n, modes="specific", kinds=SERSIC)
         self.cluster = ClusterRows(self)
+        self.lens = LensRows(self)
         self.fluxes = FluxRows(self, "uniform", (1e-15, 1e-14), _is("flux"))
         self.cluster_fluxes = FluxRows(self, "power", CLUSTER_FLUX, _is("flux"))
         self._r_limits_row = self._add_limits("R½", self.r_limits, EXTENDED)
@@ -206,6 +210,7 @@ class SourceForm(Form):
         self.relabel(self._flux_row, f"F ({units.flux_label})")
         for rows in (self.fluxes, self.cluster_fluxes):
             rows.show_in(flux_scale, units.flux_label)
+        self.lens.show_in(flux_scale, units.flux_label)
         for row, name, field in (
             (self._r_row, "R½", self.r_half),
             (self._r_limits_row, "R½", self.r_limits),
@@ -233,6 +238,12 @@ class SourceForm(Form):
                 **self.cluster.options(),
                 **self.cluster_fluxes.options(),
             )
+        if self.mode.value == "lens":
+            return lensed_quasar(
+                observation=self.scene.observation,
+                centre=(self.x.number, self.y.number),
+                **self.lens.options(),
+            )
         kind = self.kind.value
         ranges: dict[str, Any] = {}
         if kind != "point":
@@ -259,7 +270,7 @@ class SourceForm(Form):
         except ValueError as error:
             show_error(str(error))
             return
-        if self.mode.value != "specific":
+        if self.mode.value in ("random", "cluster"):
             self.seed.number += 1
 
     def _one(self) -> dict[str, Any]:
@@ -287,6 +298,7 @@ class SourceForm(Form):
         for row, modes, kinds in self._rows_where:
             self.show_row(row, mode in modes and kind in kinds)
         self.cluster.show(mode == "cluster")
+        self.lens.show(mode == "lens")
         self.fluxes.show(mode == "random")
         self.cluster_fluxes.show(mode == "cluster")
         self._describe_drawn()

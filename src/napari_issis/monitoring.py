@@ -1,0 +1,461 @@
+"""A sequence of exposures of one scene: epochs, light curves, time delays, roll and dithers."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+from astropy.table import QTable, Table
+from numpy.typing import NDArray
+
+from .counts import checked_seed
+from .exposure import Exposure, expose, noise_ready_rate, same_table, simulate
+from .light_curves import LightCurve, flux_factors
+from .limits import CountRateWarning, count_rate_warnings
+from .moved_frame import move_frame
+from .observation import Observation
+from .sources import FLUX_UNIT, check_sources
+
+Offset = tuple[float, float]
+IMAGES = ("counts", "expected")
+# Renders handed to dask at a time by `Monitoring.run`, so that progress can be told.
+BATCH = 16
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """When, and how the telescope then stands.
+
+    Parameters
+    ----------
+    time : float
+        In the unit of the light curves and delays, such as days.
+    roll : float
+        Added to the observation's roll, degrees.
+    offset : (float, float)
+        By which the pointing is off, pixels along the frame's +x and +y.
+    changes : mapping
+        What else differs in the observation, such as ``{"psf": ni.GaussianPSF(0.12)}`` or
+        ``{"exposure": 600}``.
+    """
+
+    time: float
+    roll: float = 0.0
+    offset: Offset = (0.0, 0.0)
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedExposure:
+    """One exposure of a sequence: all that `simulate` needs, and where it belongs."""
+
+    epoch: int
+    number: int
+    time: float
+    dither: Offset
+    sources: QTable = field(repr=False)
+    observation: Observation
+    seed: int
+    # Exposures with the same number share a render.
+    render: int
+
+    @property
+    def file_name(self) -> str:
+        """Name of its file in an output folder."""
+        return f"epoch{self.epoch:04d}_exposure{self.number:02d}.fits"
+
+    @property
+    def shift(self) -> tuple[int, int]:
+        """Whole pixels (x, y) by which it is moved before it is co-added."""
+        return round(self.dither[0]), round(self.dither[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Monitoring:
+    """A planned sequence of exposures; nothing is computed before it is asked for.
+
+    Attributes
+    ----------
+    sources : astropy.table.QTable
+        The source table.
+    observation : Observation
+        The instrument set-up.
+    epochs : tuple of Epoch
+        The epochs.
+    factors : ndarray, shape (epochs, sources)
+        Flux of each source at each epoch over that of the source table.
+    exposures : tuple of PlannedExposure
+        All exposures, epoch by epoch.
+    seed : int
+        Seed of the sequence, from which those of the exposures are drawn.
+    tolerance : float, optional
+        As for `simulate`.
+    """
+
+    sources: QTable
+    observation: Observation
+    epochs: tuple[Epoch, ...]
+    factors: NDArray[np.float64]
+    exposures: tuple[PlannedExposure, ...]
+    seed: int
+    tolerance: float | None
+    _token: str = field(default_factory=lambda: uuid4().hex, repr=False)
+
+    def simulate(self, index: int) -> Exposure:
+        """Simulate one exposure of the sequence, by its place in `exposures`."""
+        one = self.exposures[index]
+        return simulate(one.sources, one.observation, seed=one.seed, tolerance=self.tolerance)
+
+    def stack(self, image: str = "counts", *, coadd: bool = True) -> Any:
+        """Make a lazily computed stack of images.
+
+        Parameters
+        ----------
+        image : {"counts", "expected"}
+            Detected or expected counts.
+        coadd : bool
+            Whether the exposures of an epoch are added, each first moved back by its dither
+            rounded to whole pixels; no count is divided, and what falls outside the frame is
+            left out (see `exposure_map`).
+
+        Returns
+        -------
+        dask.array.Array, shape (epochs or exposures, ny, nx)
+            One chunk a frame. Frames that are computed together share their renders; the
+            scheduler is the one in use, a `dask.distributed.Client` for instance.
+
+        Raises
+        ------
+        ImportError
+            If dask is not installed: ``pip install "napari-issis[monitor]"``.
+        """
+        if image not in IMAGES:
+            raise ValueError(f"image is {image!r}; known: {', '.join(IMAGES)}.")
+        dask, da = _dask()
+        dtype = np.int64 if image == "counts" else np.float64
+        frames, rates = [], self._rates(dask)
+        for index, one in enumerate(self.exposures):
+            name = f"issis-{image}-{self._token}-{index}"
+            draw = dask.delayed(_image, pure=False)
+            frames.append(draw(rates[one.render], one, image, dask_key_name=name))
+        if coadd:
+            add = dask.delayed(_add, pure=False)
+            frames = [
+                add(
+                    [frames[index] for index in members],
+                    [self.exposures[index].shift for index in members],
+                    dask_key_name=f"issis-sum-{image}-{self._token}-{epoch}",
+                )
+                for epoch, members in enumerate(self._members())
+            ]
+        shape = self.observation.shape
+        return da.stack([da.from_delayed(frame, shape, dtype=dtype) for frame in frames])
+
+    def exposure_map(self, epoch: int) -> NDArray[np.float64]:
+        """Exposure time of each pixel of a co-added epoch, seconds, shape (ny, nx)."""
+        ones = [self.exposures[index] for index in self._members()[epoch]]
+        times = [np.full(self.observation.shape, one.observation.exposure) for one in ones]
+        return _add(times, [one.shift for one in ones])
+
+    def run(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> list[Path]:
+        """Simulate all exposures into a folder, one FITS file each; finished ones are kept.
+
+        Parameters
+        ----------
+        folder : path-like
+            Created if it is missing. Workers of a cluster write into it, so that they must see
+            it under the same path.
+        progress : callable, optional
+            Called with the numbers of finished and of all exposures.
+
+        Returns
+        -------
+        list of Path
+            The files, in the order of `exposures`.
+
+        Raises
+        ------
+        ValueError
+            If a file of that name holds another exposure, or is damaged; nothing is computed
+            then.
+        OSError
+            If a file cannot be written; those finished before stay.
+        ImportError
+            If dask is not installed.
+        """
+        dask, _ = _dask()
+        place = Path(folder).resolve()
+        place.mkdir(parents=True, exist_ok=True)
+        paths = [place / one.file_name for one in self.exposures]
+        groups: dict[int, list[int]] = {}
+        for index, path in enumerate(paths):
+            if path.exists():
+                _check_finished(path, self.exposures[index])
+            else:
+                groups.setdefault(self.exposures[index].render, []).append(index)
+        total = len(paths)
+        done = total - sum(map(len, groups.values()))
+        tell = progress or (lambda done, total: None)
+        tell(done, total)
+        rates, write = self._rates(dask), dask.delayed(_write, pure=False)
+        # All exposures of a render go together, so that none is rendered twice.
+        renders = list(groups)
+        for start in range(0, len(renders), BATCH):
+            members = [i for render in renders[start : start + BATCH] for i in groups[render]]
+            tasks = [
+                write(
+                    rates[self.exposures[index].render],
+                    self.exposures[index],
+                    str(paths[index]),
+                    dask_key_name=f"issis-file-{self._token}-{index}",
+                )
+                for index in members
+            ]
+            dask.compute(*tasks)
+            done += len(members)
+            tell(done, total)
+        return paths
+
+    def write_cube(
+        self,
+        path: str | os.PathLike[str],
+        image: str = "counts",
+        *,
+        coadd: bool = True,
+        overwrite: bool = False,
+    ) -> None:
+        """Write the stack as a FITS cube; see `napari_issis.fits_cube.write_cube`."""
+        from .fits_cube import write_cube
+
+        write_cube(self, path, image, coadd=coadd, overwrite=overwrite)
+
+    def show(self, viewer: Any = None, *, image: str = "counts", coadd: bool = True) -> Any:
+        """Show the stack in napari, with its slider over the epochs; returns the layer."""
+        from .plugin.monitoring_layer import show_monitoring
+
+        return show_monitoring(self, viewer, image=image, coadd=coadd)
+
+    def _members(self) -> list[list[int]]:
+        members: list[list[int]] = [[] for _ in self.epochs]
+        for index, one in enumerate(self.exposures):
+            members[one.epoch].append(index)
+        return members
+
+    def _rates(self, dask: Any) -> dict[int, Any]:
+        render = dask.delayed(_rate, pure=False)
+        rates: dict[int, Any] = {}
+        for one in self.exposures:
+            if one.render not in rates:
+                name = f"issis-rate-{self._token}-{one.render}"
+                rates[one.render] = render(
+                    one.sources, one.observation, self.tolerance, dask_key_name=name
+                )
+        return rates
+
+
+def monitor(
+    sources: Table,
+    observation: Observation | None = None,
+    epochs: Sequence[float | Epoch] = (0.0,),
+    *,
+    light_curves: Mapping[int, LightCurve] | None = None,
+    delays: Mapping[int, float] | None = None,
+    exposures: int = 1,
+    dithers: Sequence[Offset] | None = None,
+    seed: int = 0,
+    tolerance: float | None = None,
+) -> Monitoring:
+    """Plan a sequence of exposures.
+
+    Parameters
+    ----------
+    sources : astropy.table.Table
+        The source table, in the frame of ``observation``.
+    observation : Observation, optional
+        The instrument set-up; the exposure time is that of each single exposure.
+    epochs : sequence of float or Epoch
+        Times, or epochs with roll, pointing offset and other changes.
+    light_curves : mapping of int to callable or (times, factors), optional
+        By row of the source table: its flux over that of the table, as a function of time or
+        as a table that is interpolated linearly.
+    delays : mapping of int to float, optional
+        By row: its light curve arrives so much later.
+    exposures : int
+        Exposures at each epoch.
+    dithers : sequence of (float, float), optional
+        Offsets of the pointing of the exposures at an epoch, pixels along the frame's +x and
+        +y, one for each exposure.
+    seed : int
+        Seed of the sequence. Each exposure has a seed of its own, a function of this one, the
+        epoch's number and the exposure's.
+    tolerance : float, optional
+        As for `simulate`.
+
+    Returns
+    -------
+    Monitoring
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range; the message names it.
+    """
+    observation = Observation() if observation is None else observation
+    arrays = check_sources(sources, pivot=observation.pivot)
+    seed = checked_seed(seed)
+    whole = tuple(one if isinstance(one, Epoch) else Epoch(_time(one)) for one in epochs)
+    if not whole:
+        raise ValueError("epochs is empty; give at least one time.")
+    if isinstance(exposures, bool) or not hasattr(exposures, "__index__") or exposures < 1:
+        raise ValueError(f"exposures is {exposures!r}; it is a whole number of 1 or more.")
+    steps = [(0.0, 0.0)] * exposures if dithers is None else [_offset(d) for d in dithers]
+    if len(steps) != exposures:
+        raise ValueError(f"there are {len(steps)} dithers and {exposures} exposures; give as many.")
+    times = np.array([_time(one.time) for one in whole])
+    factors = flux_factors(light_curves, delays, times, len(arrays))
+    planned: list[PlannedExposure] = []
+    renders: dict[Any, int] = {}
+    for number, epoch in enumerate(whole):
+        table = QTable(sources, copy=True)
+        changed = _changed(observation, epoch, number)
+        if not np.all(factors[number] == 1):
+            flux = check_sources(sources, pivot=changed.pivot).flux
+            table["flux"] = flux * factors[number] * FLUX_UNIT
+        off = _offset(epoch.offset)
+        for k, step in enumerate(steps):
+            total = (off[0] + step[0], off[1] + step[1])
+            seen, frame = move_frame(table, changed, roll=float(epoch.roll), offset=total)
+            render = renders.setdefault(_scene_key(seen, frame), len(renders))
+            own = np.random.SeedSequence(seed, spawn_key=(number, k)).generate_state(1, np.uint64)
+            planned.append(
+                PlannedExposure(
+                    number, k, float(times[number]), step, seen, frame, int(own[0]), render
+                )
+            )
+    return Monitoring(
+        QTable(sources, copy=True), observation, whole, factors, tuple(planned), seed, tolerance
+    )
+
+
+def _scene_key(sources: QTable, observation: Observation) -> Any:
+    """Return what the count rate depends on."""
+    arrays = check_sources(sources, pivot=observation.pivot)
+    values = tuple(getattr(arrays, name).tobytes() for name in arrays.__dataclass_fields__)
+    return observation.replace(exposure=1.0), values
+
+
+def _changed(observation: Observation, epoch: Epoch, number: int) -> Observation:
+    for name in ("shape", "pointing", "roll"):
+        if name in epoch.changes:
+            raise ValueError(
+                f"epoch {number} changes the {name}; use roll= and offset= of the Epoch, and one "
+                "shape for all."
+            )
+    try:
+        return observation.replace(**epoch.changes)
+    except TypeError as error:
+        raise ValueError(f"epoch {number} changes what an observation has not: {error}.") from None
+
+
+def _time(time: Any) -> float:
+    try:
+        value = float(time)
+    except (TypeError, ValueError):
+        raise ValueError(f"the time of an epoch is {time!r}; it must be a number.") from None
+    if not np.isfinite(value):
+        raise ValueError(f"the time of an epoch is {value}; it must be finite.")
+    return value
+
+
+def _offset(offset: Any) -> Offset:
+    try:
+        x, y = (float(value) for value in offset)
+    except (TypeError, ValueError):
+        raise ValueError(f"an offset is {offset!r}; give (x, y) in pixels.") from None
+    if not (np.isfinite(x) and np.isfinite(y)):
+        raise ValueError(f"an offset is ({x}, {y}); it must be finite.")
+    return x, y
+
+
+def _dask() -> tuple[Any, Any]:
+    try:
+        import dask
+        import dask.array as da
+    except ImportError:
+        raise ImportError(
+            'stacks of exposures need dask: pip install "napari-issis[monitor]"'
+        ) from None
+    return dask, da
+
+
+def _rate(
+    sources: QTable, observation: Observation, tolerance: float | None
+) -> tuple[NDArray[np.float64], float]:
+    rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
+    for message in count_rate_warnings(
+        rate, observation.background_rate, sources=sources, observation=observation
+    ):
+        warnings.warn(message, CountRateWarning, stacklevel=2)
+    return rate, clipped
+
+
+def _exposed(rate: tuple[NDArray[np.float64], float], one: PlannedExposure) -> Exposure:
+    return expose(rate[0], one.sources, one.observation, seed=one.seed, clipped=rate[1])
+
+
+def _image(
+    rate: tuple[NDArray[np.float64], float], one: PlannedExposure, image: str
+) -> NDArray[Any]:
+    if image == "expected":
+        return (rate[0] + one.observation.background_rate) * one.observation.exposure
+    return _exposed(rate, one).counts
+
+
+def _write(rate: tuple[NDArray[np.float64], float], one: PlannedExposure, path: str) -> str:
+    try:
+        _exposed(rate, one).write(path)
+    except FileExistsError:
+        # A cluster may run a task again whose worker was lost after it had written.
+        _check_finished(Path(path), one)
+    return path
+
+
+def _add(frames: Sequence[NDArray[Any]], shifts: Sequence[tuple[int, int]]) -> NDArray[Any]:
+    """Add frames, each moved by whole pixels (x, y)."""
+    total = np.zeros_like(frames[0])
+    ny, nx = total.shape
+    for frame, (dx, dy) in zip(frames, shifts, strict=True):
+        if abs(dx) >= nx or abs(dy) >= ny:
+            continue
+        to = slice(max(dy, 0), ny + min(dy, 0)), slice(max(dx, 0), nx + min(dx, 0))
+        of = slice(max(-dy, 0), ny + min(-dy, 0)), slice(max(-dx, 0), nx + min(-dx, 0))
+        total[to] += frame[of]
+    return total
+
+
+def _check_finished(path: Path, one: PlannedExposure) -> None:
+    """Raise a ValueError if a file is not the planned exposure."""
+    from .fits_io import read_scene
+    from .fits_table import open_fits
+
+    try:
+        with open_fits(path) as hdus:
+            sources, observation, seed, _ = read_scene(hdus)
+    except ValueError as error:
+        raise ValueError(f"{path} is no finished exposure ({error}); remove it.") from error
+    same = seed == one.seed and observation == one.observation
+    if not (same and same_table(sources, one.sources)):
+        raise ValueError(
+            f"{path} holds an exposure of another sequence; choose another folder, or remove it."
+        )
