@@ -340,11 +340,14 @@ def test_changing_the_frame_keeps_the_sources(scene):
     assert scene.counts.layer.data.shape == (256, 256)
 
 
-def test_edges_are_as_thick_on_the_screen_in_any_frame(scene, mouse):
+def test_edges_are_as_thick_on_the_screen_in_any_frame(scene, mouse, qtbot):
     """Catches ellipses that vanish in large frames, also those drawn afterwards."""
     layer = scene.editor.ellipses.layer
     for side in (1024, 512, 256):
         scene.observation = SMALL.replace(shape=(side, side))
+        # The view fits the frame when its picture comes, and the edges follow the view.
+        scene.wait()
+        qtbot.waitUntil(lambda: not scene._zoomed.isActive(), timeout=2000)
         layer.selected_data = {0}
         scene.viewer.layers.selection.active = layer
         layer.mode = "add_ellipse"
@@ -378,6 +381,18 @@ def test_closing_in_the_middle_of_a_render(scene, qtbot):
     scene.viewer.layers.clear()
     qtbot.waitUntil(lambda: not scene._jobs.busy, timeout=5000)
     assert len(scene.viewer.layers) == 0
+
+
+def test_edges_suit_the_zoom_that_stays_when_the_frame_changes(scene, qtbot):
+    """Catches edges made for the whole of a new frame in a view that does not show it all."""
+    scene.viewer.add_points([[0.5, 0.5]])
+    camera, layer = scene.viewer.scene.camera, scene.editor.ellipses.layer
+    camera.zoom = 8 * 1.5 / (layer.edge_width[0] * 0.036)
+    scene.observation = SMALL.replace(shape=(1024, 1024))
+    scene.wait()
+    zoom = camera.zoom
+    qtbot.waitUntil(lambda: np.allclose(0.036 * zoom * np.array(layer.edge_width), 1.5))
+    assert camera.zoom == zoom
 
 
 def test_edges_stay_thin_when_zoomed(scene, qtbot):

@@ -171,6 +171,8 @@ class Scene:
         self.editor.pivot = observation.pivot
         if reframed:
             self._fit_marks()
+            # a view that stays as it is shows the new frame at another zoom than the whole
+            self._zoom_changed()
         self.counts.rescale(always=True)
         self._set_up += 1
         self._soon()

@@ -62,6 +62,9 @@ class SourceList(QWidget):  # type: ignore[misc]
         self.model = SourceModel(self.scene)
         self.view = QTableView()
         self.view.setModel(self.model)
+        self.view.setToolTip(
+            "The sources: click a heading to sort, double click a cell (or F2) to edit it"
+        )
         self.view.setItemDelegate(_Delegate(self.view))
         self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.view.setSortingEnabled(True)
