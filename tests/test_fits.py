@@ -19,6 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from napari_issis import (
+    Detector,
     Exposure,
     GaussianPSF,
     ImagePSF,
@@ -58,6 +59,7 @@ OBSERVATIONS = {
     "one pixel": Observation(shape=(1, 1)),
     "filters": Observation("FUV", ("NF1", "NF2"), exposure=ODD, shape=(4, 6)),
     "sky": Observation(shape=(4, 6), background=ODD * 1e-300),
+    "detector": Observation(shape=(4, 6), detector=Detector(ODD * 1e-3, rollover=True)),
     "no sky": Observation(shape=(4, 6), background=0.0),
     "pointing": Observation(shape=(4, 6), pointing=SkyCoord(LENSES, -LENSES), roll=ODD),
     "galactic": Observation(shape=(4, 6), pointing=SkyCoord(ODD, 1, unit="deg", frame="galactic")),

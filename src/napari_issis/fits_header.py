@@ -47,6 +47,9 @@ def observation_header(exposure: Exposure) -> fits.Header:
     header["SKYRATE"] = (observation.sky_rate, "[ct/s/pixel] sky, with filters")
     header["SKYMODEL"] = sky_description(observation)
     header["DARKRATE"] = (observation.dark, "[ct/s/pixel] of the detector itself")
+    detector = observation.detector
+    header["DEADTIME"] = (detector.dead_time, "[s] of a pixel after each count; 0: no loss")
+    header["ROLLOVER"] = (detector.rollover, "T: the counts are modulo 65536")
     header["SKYCOUNT"] = (
         observation.sky_rate * observation.exposure,
         "[ct/pixel] expected sky in the exposure",

@@ -25,6 +25,7 @@ from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .exposure import Exposure
+from .detector import Detector
 from .fits_header import observation_header, wcs_header
 from .fits_light_path import filter_hdus, sky_values, stored_filters, stored_sky
 from .fits_table import open_fits, read_table, table_hdu
@@ -247,6 +248,8 @@ def _record(observation: Observation, seed: int, clipped: float) -> Table:
         "NY": observation.shape[0],
         "NX": observation.shape[1],
         "DARK": observation.dark,
+        "DEAD_TIME": observation.detector.dead_time,
+        "ROLLOVER": observation.detector.rollover,
         "BACKGROUND": np.nan if observation.background is None else observation.background,
         "RA": np.nan if pointing is None else float(pointing.ra.deg),
         "DEC": np.nan if pointing is None else float(pointing.dec.deg),
@@ -279,6 +282,8 @@ def _observation(row: dict[str, Any], hdus: fits.HDUList) -> Observation:
         roll=float(row["ROLL"]),
         sky=stored_sky(row),
         dark=float(row.get("DARK", 0.0)),
+        # files written before there were any name none
+        detector=Detector(float(row.get("DEAD_TIME", 0.0)), bool(row.get("ROLLOVER", False))),
     )
 
 
