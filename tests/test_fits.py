@@ -65,6 +65,9 @@ OBSERVATIONS = {
     "galactic": Observation(shape=(4, 6), pointing=SkyCoord(ODD, 1, unit="deg", frame="galactic")),
     "pole": Observation(shape=(4, 6), pointing=SkyCoord(0, 90, unit="deg"), roll=-725.0),
     "telescope": Observation(shape=(4, 6), psf=TelescopePSF(1.7 * ODD, ODD, (1150.1, 1750), ODD)),
+    "halo": Observation(
+        shape=(4, 6), psf=TelescopePSF(1.7, 0.3, 2500.0, ODD, ODD / 3, ODD / 7, 3 * ODD)
+    ),
     "one wavelength": Observation(shape=(4, 6), psf=TelescopePSF(1.7, 0.0, 2500 * ODD)),
     "gaussian": Observation(shape=(4, 6), psf=GaussianPSF(ODD)),
     "moffat": Observation(shape=(4, 6), psf=MoffatPSF(ODD, 2.5 + ODD)),

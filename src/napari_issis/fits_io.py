@@ -24,8 +24,8 @@ from astropy.io import fits
 from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
-from .exposure import Exposure
 from .detector import Detector
+from .exposure import Exposure
 from .fits_header import observation_header, wcs_header
 from .fits_light_path import filter_hdus, sky_values, stored_filters, stored_sky
 from .fits_table import open_fits, read_table, table_hdu
@@ -296,6 +296,9 @@ def _psf_values(psf: PSF) -> dict[str, Any]:
             "BAND_LOW": low,
             "BAND_HIGH": high,
             "BLUR_FWHM": psf.blur_fwhm,
+            "JITTER_FWHM": psf.jitter_fwhm,
+            "HALO_SHARE": psf.halo_share,
+            "HALO_FWHM": psf.halo_fwhm,
         }
     if type(psf) is GaussianPSF:
         return {"FWHM": psf.fwhm}
@@ -317,6 +320,9 @@ def _psf(row: dict[str, Any], hdus: fits.HDUList) -> PSF:
             float(row["OBSCURATION"]),
             band=(float(row["BAND_LOW"]), float(row["BAND_HIGH"])),
             blur_fwhm=float(row["BLUR_FWHM"]),
+            jitter_fwhm=float(row.get("JITTER_FWHM", 0.0)),
+            halo_share=float(row.get("HALO_SHARE", 0.0)),
+            halo_fwhm=float(row.get("HALO_FWHM", 0.0)),
         )
     if kind == "GaussianPSF":
         return GaussianPSF(float(row["FWHM"]))

@@ -14,7 +14,8 @@ def test_boxes_and_scene_follow_each_other(scene, qtbot):
     form = InstrumentForm(scene)
     qtbot.addWidget(form)
     form.resume()
-    assert not form.loss.value and not form.rollover.value
+    assert not form.loss.value
+    assert not form.rollover.value
     form.loss.value = True
     form.rollover.value = True
     detector = scene.observation.detector
@@ -26,5 +27,6 @@ def test_boxes_and_scene_follow_each_other(scene, qtbot):
     form.loss.value = False
     assert scene.observation.detector == Detector(rollover=True)
     scene.observation = scene.observation.replace(detector=Detector(1e-3))
-    assert form.loss.value and not form.rollover.value
+    assert form.loss.value
+    assert not form.rollover.value
     assert scene.observation.detector.dead_time == 1e-3

@@ -82,7 +82,7 @@ class InstrumentForm(Form):
         self.add("Sky", self.sky_model)
         self.loss = CheckBox(
             text="Coincidence loss",
-            tooltip="Photons lost in bright pixels by a dead time: 1 % at 22 cps, as in HST ACS/SBC",
+            tooltip="Photons lost in bright pixels to a dead time: 1 % at 22 cps as in ACS/SBC",
         )
         self.rollover = CheckBox(
             text="16-bit rollover",
@@ -150,11 +150,15 @@ class InstrumentForm(Form):
             (self.wheel1, observation.filters[0]),
             (self.wheel2, observation.filters[1]),
             (self.frame, observation.shape),
-            (self.loss, observation.detector.dead_time > 0),
-            (self.rollover, observation.detector.rollover),
         ):
             with widget.changed.blocked():
                 widget.value = value
+        for box, on in (
+            (self.loss, observation.detector.dead_time > 0),
+            (self.rollover, observation.detector.rollover),
+        ):
+            with box.changed.blocked():
+                box.value = on
         # What the user is typing, or has to correct, stays unless the value itself changed.
         exposure, seed, pointing, roll = self._shown
         self._shown = (

@@ -9,8 +9,8 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from ..counts import poisson_counts
-from ..drag import Drag
 from ..detector import IDEAL
+from ..drag import Drag
 from ..exposure import (
     Exposure,
     accuracy_for_counts,
