@@ -19,6 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from napari_issis import (
+    Detector,
     Exposure,
     GaussianPSF,
     ImagePSF,
@@ -58,11 +59,15 @@ OBSERVATIONS = {
     "one pixel": Observation(shape=(1, 1)),
     "filters": Observation("FUV", ("NF1", "NF2"), exposure=ODD, shape=(4, 6)),
     "sky": Observation(shape=(4, 6), background=ODD * 1e-300),
+    "detector": Observation(shape=(4, 6), detector=Detector(ODD * 1e-3, rollover=True)),
     "no sky": Observation(shape=(4, 6), background=0.0),
     "pointing": Observation(shape=(4, 6), pointing=SkyCoord(LENSES, -LENSES), roll=ODD),
     "galactic": Observation(shape=(4, 6), pointing=SkyCoord(ODD, 1, unit="deg", frame="galactic")),
     "pole": Observation(shape=(4, 6), pointing=SkyCoord(0, 90, unit="deg"), roll=-725.0),
     "telescope": Observation(shape=(4, 6), psf=TelescopePSF(1.7 * ODD, ODD, (1150.1, 1750), ODD)),
+    "halo": Observation(
+        shape=(4, 6), psf=TelescopePSF(1.7, 0.3, 2500.0, ODD, ODD / 3, ODD / 7, 3 * ODD)
+    ),
     "one wavelength": Observation(shape=(4, 6), psf=TelescopePSF(1.7, 0.0, 2500 * ODD)),
     "gaussian": Observation(shape=(4, 6), psf=GaussianPSF(ODD)),
     "moffat": Observation(shape=(4, 6), psf=MoffatPSF(ODD, 2.5 + ODD)),

@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .cluster_profile import ClusterProfile
+from .detector import Detector
 from .drag import Drag
 from .exposure import Exposure, simulate
 from .filters import Filter
@@ -53,6 +54,7 @@ __all__ = [
     "Catalogue",
     "ClusterProfile",
     "CountRateWarning",
+    "Detector",
     "Drag",
     "Epoch",
     "Exposure",

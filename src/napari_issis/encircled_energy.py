@@ -1,11 +1,51 @@
-"""Encircled energy of a radial PSF."""
+"""Encircled energy and width of a radial PSF."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import astropy.units as u
 import numpy as np
+from astropy.table import QTable
 from scipy import special
 
-from .psf import RadialPSF, positive
+from .psf import PSF, RadialPSF, fwhm, positive
+
+# arcsec
+DIAMETERS = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
+
+
+def psf_table(psf: PSF, diameters: Sequence[float] = DIAMETERS) -> QTable:
+    """Tabulate the encircled energy of a radial PSF.
+
+    Parameters
+    ----------
+    psf : RadialPSF
+        The PSF, such as an observation's ``effective_psf``.
+    diameters : sequence of float
+        Diameters of circles about the source, arcsec.
+
+    Returns
+    -------
+    astropy.table.QTable
+        Columns ``diameter`` (arcsec) and ``encircled_energy`` (share of the light), and the
+        full width at half maximum as ``meta["fwhm"]``; the detector's pixel is no part of it.
+
+    Raises
+    ------
+    ValueError
+        If the PSF is an image, or a diameter is not a positive number.
+    """
+    if not isinstance(psf, RadialPSF):
+        raise ValueError(
+            f"the PSF is a {type(psf).__name__}; the table needs a TelescopePSF, GaussianPSF or "
+            "MoffatPSF. Measure an image in its own program."
+        )
+    shares = [encircled_energy(psf, diameter) for diameter in diameters]
+    return QTable(
+        {"diameter": np.asarray(diameters, dtype=float) * u.arcsec, "encircled_energy": shares},
+        meta={"fwhm": fwhm(psf) * u.arcsec},
+    )
 
 
 def encircled_energy(psf: RadialPSF, diameter: float) -> float:

@@ -24,9 +24,9 @@ class Exposure:
     Attributes
     ----------
     counts : ndarray of int64, shape (ny, nx)
-        Detected counts; row 0 is drawn at the bottom.
+        Detected counts, as the detector stores them; row 0 is drawn at the bottom.
     expected : ndarray of float64, shape (ny, nx)
-        Expected counts: sources, sky and dark rate.
+        Expected counts: sources, sky and dark rate, less those that a dead time loses.
     sources : astropy.table.QTable
         The source table.
     observation : Observation
@@ -47,7 +47,7 @@ class Exposure:
     @property
     def background(self) -> float:
         """Expected counts per pixel without sources, B = beta T; sky and dark rate."""
-        return self.observation.background_rate * self.observation.exposure
+        return float(expected_of_rate(np.zeros(()), self.observation))
 
     @property
     def snr(self) -> NDArray[np.float64]:
@@ -190,7 +190,7 @@ def expose(
     seed: int = 0,
     clipped: float = 0.0,
 ) -> Exposure:
-    """Add sky and dark rate, expose and draw the counts; renders nothing.
+    """Add sky and dark rate, expose, draw the counts and store them; renders nothing.
 
     Parameters
     ----------
@@ -205,15 +205,21 @@ def expose(
     clipped : float
         Largest negative ripple removed from the rate, cps per pixel.
     """
-    expected = (rate + observation.background_rate) * observation.exposure
+    expected = expected_of_rate(rate, observation)
     return Exposure(
-        counts=poisson_counts(expected, seed),
+        counts=observation.detector.stored(poisson_counts(expected, seed)),
         expected=expected,
         sources=QTable(sources, copy=True),
         observation=observation,
         seed=int(seed),
         clipped=clipped * observation.exposure,
     )
+
+
+def expected_of_rate(rate: NDArray[np.float64], observation: Observation) -> NDArray[np.float64]:
+    """Return the expected counts of a count rate of the sources in cps per pixel, any shape."""
+    rate = observation.detector.detected(rate + observation.background_rate)
+    return np.asarray(rate * observation.exposure)
 
 
 def same_table(first: Table, second: Table) -> bool:

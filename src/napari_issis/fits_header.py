@@ -49,6 +49,9 @@ def observation_header(exposure: Exposure) -> fits.Header:
     header["SKYRATE"] = (observation.sky_rate, "[ct/s/pixel] sky, with filters")
     header["SKYMODEL"] = sky_description(observation)
     header["DARKRATE"] = (observation.dark, "[ct/s/pixel] of the detector itself")
+    detector = observation.detector
+    header["DEADTIME"] = (detector.dead_time, "[s] of a pixel after each count; 0: no loss")
+    header["ROLLOVER"] = (detector.rollover, "T: the counts are modulo 65536")
     header["SKYCOUNT"] = (
         observation.sky_rate * observation.exposure,
         "[ct/pixel] expected sky in the exposure",
@@ -76,10 +79,12 @@ def psf_description(psf: PSF) -> str:
     """One line of ASCII text on a PSF."""
     if isinstance(psf, TelescopePSF):
         band = psf.band if isinstance(psf.band, tuple) else (psf.band,)
+        jitter = f", jitter {psf.jitter_fwhm:g}" if psf.jitter_fwhm else ""
+        halo = f", halo {psf.halo_share:g} in {psf.halo_fwhm:g}" if psf.halo_share else ""
         return (
             f"{psf.diameter:g} m, obscuration {psf.obscuration:g}, "
             f"{'-'.join(f'{wavelength:g}' for wavelength in band)} A, "
-            f"blur {psf.blur_fwhm:g} arcsec FWHM"
+            f"blur {psf.blur_fwhm:g}{jitter}{halo} arcsec FWHM"
         )
     if isinstance(psf, GaussianPSF):
         return f"Gaussian, FWHM {psf.fwhm:g} arcsec"

@@ -24,6 +24,7 @@ from astropy.io import fits
 from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
+from .detector import Detector
 from .exposure import Exposure
 from .fits_header import observation_header, wcs_header
 from .fits_light_path import filter_hdus, sky_values, stored_filters, stored_sky
@@ -276,6 +277,8 @@ def _record(observation: Observation, seed: int, clipped: float) -> Table:
         "NY": observation.shape[0],
         "NX": observation.shape[1],
         "DARK": observation.dark,
+        "DEAD_TIME": observation.detector.dead_time,
+        "ROLLOVER": observation.detector.rollover,
         "BACKGROUND": np.nan if observation.background is None else observation.background,
         "RA": np.nan if pointing is None else float(pointing.ra.deg),
         "DEC": np.nan if pointing is None else float(pointing.dec.deg),
@@ -308,6 +311,8 @@ def _observation(row: dict[str, Any], hdus: fits.HDUList) -> Observation:
         roll=float(row["ROLL"]),
         sky=stored_sky(row),
         dark=float(row.get("DARK", 0.0)),
+        # files written before there were any name none
+        detector=Detector(float(row.get("DEAD_TIME", 0.0)), bool(row.get("ROLLOVER", False))),
     )
 
 
@@ -320,6 +325,9 @@ def _psf_values(psf: PSF) -> dict[str, Any]:
             "BAND_LOW": low,
             "BAND_HIGH": high,
             "BLUR_FWHM": psf.blur_fwhm,
+            "JITTER_FWHM": psf.jitter_fwhm,
+            "HALO_SHARE": psf.halo_share,
+            "HALO_FWHM": psf.halo_fwhm,
         }
     if type(psf) is GaussianPSF:
         return {"FWHM": psf.fwhm}
@@ -341,6 +349,9 @@ def _psf(row: dict[str, Any], hdus: fits.HDUList) -> PSF:
             float(row["OBSCURATION"]),
             band=(float(row["BAND_LOW"]), float(row["BAND_HIGH"])),
             blur_fwhm=float(row["BLUR_FWHM"]),
+            jitter_fwhm=float(row.get("JITTER_FWHM", 0.0)),
+            halo_share=float(row.get("HALO_SHARE", 0.0)),
+            halo_fwhm=float(row.get("HALO_FWHM", 0.0)),
         )
     if kind == "GaussianPSF":
         return GaussianPSF(float(row["FWHM"]))

@@ -12,6 +12,7 @@ from typing import Any
 import astropy.units as u
 from astropy.coordinates import SkyCoord
 
+from .detector import IDEAL, Detector, checked_detector
 from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .filters import Filter
 from .instrument import CHANNELS, FILTERS, PIXEL_SCALE, Channel
@@ -55,6 +56,8 @@ class Observation:
     dark : float
         Counts of the detector itself, cps per pixel, which no filter reduces. None is
         published for ISSIS, and the paper has none.
+    detector : Detector
+        Coincidence loss and 16-bit rollover; none by default.
 
     Raises
     ------
@@ -78,6 +81,7 @@ class Observation:
     instrument: str = "ISSIS"
     sky: SkyModel = CIS
     dark: float = 0.0
+    detector: Detector = IDEAL
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -113,6 +117,7 @@ class Observation:
                 _number("background", self.background, "cps per pixel", positive=False),
             )
         set_(self, "dark", _number("dark", self.dark, "cps per pixel", positive=False))
+        checked_detector(self.detector)
         if not isinstance(self.sky, SkyModel):
             raise ValueError(f"sky is {self.sky!r}; give a Sky, or one of SKIES by its key.")
         try:
@@ -243,6 +248,7 @@ class Observation:
             self.background,
             self.sky if self.background is None else None,
             self.dark,
+            self.detector,
             position,
             self.roll,
             self.instrument,

@@ -166,7 +166,7 @@ class MoffatPSF(RadialPSF):
 
 @dataclass(frozen=True)
 class TelescopePSF(RadialPSF):
-    """Diffraction by an annular aperture, averaged over a band, with a Gaussian blur.
+    """Diffraction by an annular aperture, averaged over a band, with Gaussian blurs and a halo.
 
     Parameters
     ----------
@@ -178,21 +178,46 @@ class TelescopePSF(RadialPSF):
         One wavelength, or the band's limits, in angstrom. Over a band the OTF is the mean of
         the monochromatic ones weighted by photons, that is by wavelength, at unit response.
     blur_fwhm : float
-        FWHM of the Gaussian blur of pointing and detector, arcsec; 0 for none.
+        FWHM of the Gaussian blur of the detector, or of pointing and detector together,
+        arcsec; 0 for none.
+    jitter_fwhm : float
+        FWHM of a Gaussian blur of the pointing beside it, arcsec; they add in quadrature.
+    halo_share : float
+        Share of the light that the detector spreads into a halo, 0 to 1.
+    halo_fwhm : float
+        FWHM of the Gaussian over which the halo's light is spread, arcsec.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range, or there is a halo without a width; the message names it.
 
     Notes
     -----
     The OTF of an annulus is its autocorrelation (O'Neill 1956, JOSA 46, 285), here as areas
-    common to two shifted circles.
+    common to two shifted circles. With a halo it is multiplied by (1 - s) + s G, with s the
+    share and G the transform of the Gaussian: each photon is counted where it falls, or with
+    probability s somewhere around.
     """
 
     diameter: float
     obscuration: float = 0.0
     band: float | tuple[float, float] = 2500.0
     blur_fwhm: float = 0.0
+    jitter_fwhm: float = 0.0
+    halo_share: float = 0.0
+    halo_fwhm: float = 0.0
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
+        for name in ("jitter_fwhm", "halo_fwhm"):
+            set_(self, name, positive(name, getattr(self, name), "arcsec", zero=True))
+        share = positive("halo_share", self.halo_share, "1 (a share)", zero=True)
+        if share > 1:
+            raise ValueError(f"halo_share is {share}; it must be a share from 0 to 1.")
+        if share and not self.halo_fwhm:
+            raise ValueError(f"halo_fwhm is 0 for a halo_share of {share}; give arcsec above 0.")
+        set_(self, "halo_share", share)
         set_(self, "diameter", positive("diameter", self.diameter, "metres"))
         set_(self, "blur_fwhm", positive("blur_fwhm", self.blur_fwhm, "arcsec", zero=True))
         obscuration = float(self.obscuration)
@@ -232,7 +257,7 @@ class TelescopePSF(RadialPSF):
         return min(0.5 * (1 - self.obscuration), self.obscuration) * cutoff
 
     def otf(self, k: ArrayLike) -> Array:
-        """Annular OTF, averaged over the band, times the blur's."""
+        """Annular OTF, averaged over the band, times those of the blurs and the halo."""
         frequency: Array = np.abs(np.asarray(k, dtype=float))
         low, high = self.band_limits
         value: Array
@@ -241,7 +266,13 @@ class TelescopePSF(RadialPSF):
         else:
             relative = np.minimum(frequency / self.cutoff(), 1.0)
             value = band_averaged_otf(self.obscuration, high / low)(relative)
-        return value * _gaussian_otf(frequency, self.blur_fwhm) if self.blur_fwhm else value
+        blur = np.hypot(self.blur_fwhm, self.jitter_fwhm) if self.jitter_fwhm else self.blur_fwhm
+        if blur:
+            value = value * _gaussian_otf(frequency, blur)
+        if self.halo_share:
+            share = self.halo_share
+            value = value * (1 - share + share * _gaussian_otf(frequency, self.halo_fwhm))
+        return value
 
 
 def fwhm(psf: RadialPSF) -> float:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
-from magicgui.widgets import ComboBox, PushButton
+from magicgui.widgets import CheckBox, ComboBox, PushButton
 from napari.utils.notifications import show_error
 from qtpy.QtWidgets import QFileDialog
 
+from ..detector import Detector
 from ..filter_set import FILTER_NAMES, FILTER_NOTE, ILLUSTRATIVE_FILTERS
 from ..filters import Filter
 from ..instrument import CHANNELS, FRAME_SIZES, PIXEL_SCALE, PSF_NOTE
@@ -78,6 +80,15 @@ class InstrumentForm(Form):
         self.add("RA Dec, roll", self.position, self.roll)
         self.add("Noise seed", self.seed, self.new_noise)
         self.add("Sky", self.sky_model)
+        self.loss = CheckBox(
+            text="Coincidence loss",
+            tooltip="Photons lost in bright pixels to a dead time: 1 % at 22 cps as in ACS/SBC",
+        )
+        self.rollover = CheckBox(
+            text="16-bit rollover",
+            tooltip="A pixel's memory has 16 bits: it holds the counts modulo 65536",
+        )
+        self.add("Detector", self.loss, self.rollover)
         self.sky = self.add_text("Background with the filters in place, by parts")
         self.psf = self.add_text(PSF_NOTE)
         self.warning = self.add_text("Limits of HST ACS/SBC, the nearest analogue")
@@ -95,6 +106,10 @@ class InstrumentForm(Form):
         self.sky_model.changed.connect(lambda sky: self._apply(sky=sky))
         for wheel_box in (self.wheel1, self.wheel2):
             wheel_box.changed.connect(self._apply_filters)
+        self.loss.changed.connect(self._apply_loss)
+        self.rollover.changed.connect(
+            lambda on: self._apply(detector=replace(self.scene.observation.detector, rollover=on))
+        )
         self.frame.changed.connect(lambda shape: self._apply(shape=shape))
         # What is being typed takes effect with Enter or when the field is left.
         self.exposure.native.editingFinished.connect(self._apply_exposure)
@@ -138,6 +153,12 @@ class InstrumentForm(Form):
         ):
             with widget.changed.blocked():
                 widget.value = value
+        for box, on in (
+            (self.loss, observation.detector.dead_time > 0),
+            (self.rollover, observation.detector.rollover),
+        ):
+            with box.changed.blocked():
+                box.value = on
         # What the user is typing, or has to correct, stays unless the value itself changed.
         exposure, seed, pointing, roll = self._shown
         self._shown = (
@@ -182,6 +203,11 @@ class InstrumentForm(Form):
             one if _passes(channel, one) else "open" for one in self.scene.observation.filters
         )
         self._apply(channel=channel, filters=filters)
+
+    def _apply_loss(self, on: bool) -> None:
+        """Switch the dead time of the nearest analogue on, or any dead time off."""
+        dead_time = Detector.losing().dead_time if on else 0.0
+        self._apply(detector=replace(self.scene.observation.detector, dead_time=dead_time))
 
     def _apply_filters(self, event: Any = None) -> None:
         chosen = [self.wheel1.value, self.wheel2.value]

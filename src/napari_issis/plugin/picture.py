@@ -9,8 +9,16 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from ..counts import poisson_counts
+from ..detector import IDEAL
 from ..drag import Drag
-from ..exposure import Exposure, accuracy_for_counts, expose, noise_ready_rate, same_table
+from ..exposure import (
+    Exposure,
+    accuracy_for_counts,
+    expected_of_rate,
+    expose,
+    noise_ready_rate,
+    same_table,
+)
 from ..limits import count_rate_warnings
 from ..observation import Observation
 
@@ -92,6 +100,8 @@ class PictureMaker:
         else:
             expected = _expected(live.rate, observation)
             counts = poisson_counts(expected, seed)
+        # those taken over are stored already, which changes nothing a second time
+        counts = observation.detector.stored(counts)
         held.drawn = ((observation, seed), expected, counts)
         table = QTable(sources, copy=True)
         return Picture(Exposure(counts, expected, table, observation, seed), final=False)
@@ -142,7 +152,7 @@ class PictureMaker:
 def _expected(rate: Array, observation: Observation) -> Array:
     """Return the expected counts of rates at open-open."""
     sources = np.maximum(rate, 0.0) * observation.neutral_transmittance
-    return (sources + observation.background_rate) * observation.exposure
+    return expected_of_rate(sources, observation)
 
 
 def _rendered(observation: Observation) -> Rendered:
@@ -151,6 +161,6 @@ def _rendered(observation: Observation) -> Rendered:
     Rates are kept at open-open, for one second and without a sky.
     """
     bare = observation.without_neutral_filters().replace(
-        exposure=1.0, background=0.0, dark=0.0, pointing=None, roll=0.0
+        exposure=1.0, background=0.0, dark=0.0, detector=IDEAL, pointing=None, roll=0.0
     )
     return bare, accuracy_for_counts(observation)
