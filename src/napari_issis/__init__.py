@@ -18,6 +18,7 @@ from .render import count_rate
 from .sky import SKIES, Sky
 from .source_counts import signal_to_noise
 from .sources import source
+from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 
 if TYPE_CHECKING:
     from astropy.table import Table
@@ -47,6 +48,7 @@ _FILES = {
 
 __all__ = [
     "SKIES",
+    "BlackBody",
     "Catalogue",
     "ClusterProfile",
     "CountRateWarning",
@@ -54,13 +56,19 @@ __all__ = [
     "Exposure",
     "Filter",
     "FitsImage",
+    "Flat",
     "GaussianPSF",
     "ImagePSF",
+    "Line",
     "MoffatPSF",
     "Observation",
+    "PowerLaw",
     "Sky",
+    "Spectrum",
+    "TableSpectrum",
     "TelescopePSF",
     "count_rate",
+    "parse_spectrum",
     "random_sources",
     "read_catalogue",
     "read_image",

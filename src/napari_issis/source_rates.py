@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .extinction import EXTINCTION_KNOTS
 from .observation import Observation
 from .passband import Passband
-from .sources import SourceArrays, check_sources, spectrum_texts
+from .sources import SourceArrays, check_sources, spectra_of
 from .spectra import FLAT, Spectrum, parse_spectrum
 
 Array = NDArray[np.float64]
@@ -56,11 +56,11 @@ def rates_per_flux(table: Table, observation: Observation) -> float | Array:
     float or ndarray, shape (n,)
         One number where all spectra are flat.
     """
-    texts = spectrum_texts(table)
-    if texts is None:
+    spectra = spectra_of(table)
+    if all(spectrum == FLAT for spectrum, _ in spectra):
         return observation.cps_per_flux
-    rates = np.full(len(texts), observation.cps_per_flux)
-    for spectrum, rows in _groups(texts):
+    rates = np.full(len(table), observation.cps_per_flux)
+    for spectrum, rows in spectra:
         try:
             rates[rows] = cps_per_flux(spectrum, observation)
         except ValueError as error:
@@ -78,11 +78,11 @@ def flux_pivots(table: Table, observation: Observation) -> float | Array:
         the wavelength at which the flux is given or, where it is the mean over the channel's
         band, the channel's own pivot wavelength. One number where all spectra are flat.
     """
-    texts = spectrum_texts(table)
-    if texts is None:
+    spectra = spectra_of(table)
+    if all(spectrum == FLAT for spectrum, _ in spectra):
         return observation.pivot
-    pivots = np.full(len(texts), observation.pivot)
-    for spectrum, rows in _groups(texts):
+    pivots = np.full(len(table), observation.pivot)
+    for spectrum, rows in spectra:
         if spectrum != FLAT:
             own = spectrum.flux_at
             pivots[rows] = observation.channel_data.pivot if own is None else own
@@ -129,15 +129,6 @@ def cps_per_flux(spectrum: Spectrum | str, observation: Observation) -> float:
     channel = observation.channel_data.cps_per_flux * observation.neutral_transmittance
     # without curves this is exactly 1 for a flux that is the mean over the band
     return channel * (passed / unit)
-
-
-def _groups(texts: NDArray[np.str_]) -> list[tuple[Spectrum, NDArray[np.intp]]]:
-    """Spectra that occur, each with its rows."""
-    unique, which = np.unique(texts, return_inverse=True)
-    order = np.argsort(which, kind="stable")
-    ends = np.cumsum(np.bincount(which, minlength=unique.size))[:-1]
-    rows = np.split(order, ends)
-    return [(parse_spectrum(str(one)), rows[i]) for i, one in enumerate(unique)]
 
 
 @lru_cache(maxsize=4096)

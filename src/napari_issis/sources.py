@@ -199,15 +199,33 @@ def check_sources(
         low, high = INDEX_RANGE
         _require("n", n, (n >= low) & (n <= high), sersic, f"in [{low}, {high}]")
         index[sersic] = n[sersic]
-    texts = spectrum_texts(table)
-    if texts is not None:
-        unique, first = np.unique(texts, return_index=True)
-        for row, text in sorted(zip(first, unique, strict=True)):
-            try:
-                parse_spectrum(str(text))
-            except ValueError as error:
-                raise ValueError(f"row {row}, spectrum: {error}") from None
+    spectra_of(table)
     return SourceArrays(kind, x, y, flux, r_half, ellipticity, pa, index)
+
+
+def spectra_of(table: Table) -> list[tuple[Spectrum, NDArray[np.intp]]]:
+    """Spectra that occur in a source table, each with its rows; none if it has no such column.
+
+    Raises
+    ------
+    ValueError
+        If a text is no spectrum; the message names the row.
+    ImportError
+        If there is reddening and ``dust_extinction`` is not installed.
+    """
+    texts = spectrum_texts(table)
+    if texts is None or not texts.size:
+        return []
+    _, which = np.unique(texts, return_inverse=True)
+    order = np.argsort(which, kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(which))[:-1])
+    found = []
+    for rows in sorted(groups, key=lambda rows: int(rows[0])):
+        try:
+            found.append((parse_spectrum(str(texts[rows[0]])), rows))
+        except ValueError as error:
+            raise ValueError(f"row {rows[0]}, spectrum: {error}") from None
+    return found
 
 
 def spectrum_texts(table: Table) -> NDArray[np.str_] | None:
@@ -215,7 +233,7 @@ def spectrum_texts(table: Table) -> NDArray[np.str_] | None:
 
     A missing value is an empty text, that is the flat spectrum.
     """
-    if "spectrum" not in table.colnames:
+    if not isinstance(table, Table) or "spectrum" not in table.colnames:
         return None
     column = table["spectrum"]
     if not hasattr(column, "mask") and column.dtype.kind == "U":
