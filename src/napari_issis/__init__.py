@@ -16,7 +16,7 @@ from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
-from .source_counts import signal_to_noise
+from .source_counts import expected_counts, signal_to_noise
 from .sources import source
 from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 
@@ -68,6 +68,7 @@ __all__ = [
     "TableSpectrum",
     "TelescopePSF",
     "count_rate",
+    "expected_counts",
     "parse_spectrum",
     "random_sources",
     "read_catalogue",
