@@ -20,8 +20,9 @@ from .populations import random_sources, star_cluster
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
-from .source_counts import signal_to_noise
+from .source_counts import expected_counts, signal_to_noise
 from .sources import source
+from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 
 if TYPE_CHECKING:
     from astropy.table import Table
@@ -51,6 +52,7 @@ _FILES = {
 
 __all__ = [
     "SKIES",
+    "BlackBody",
     "Catalogue",
     "ClusterProfile",
     "CountRateWarning",
@@ -60,18 +62,25 @@ __all__ = [
     "Exposure",
     "Filter",
     "FitsImage",
+    "Flat",
     "GaussianPSF",
     "ImagePSF",
+    "Line",
     "MoffatPSF",
     "Monitoring",
     "Observation",
+    "PowerLaw",
     "Sky",
+    "Spectrum",
+    "TableSpectrum",
     "TelescopePSF",
     "count_rate",
+    "expected_counts",
     "lens_images",
     "lensed_quasar",
     "lensed_quasars",
     "monitor",
+    "parse_spectrum",
     "random_sources",
     "read_catalogue",
     "read_image",

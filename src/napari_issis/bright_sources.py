@@ -10,7 +10,7 @@ from .instrument import LIMITS
 from .observation import Observation
 from .render import peaks
 from .render.optics import Optics
-from .sources import check_sources
+from .source_rates import sources_and_rates
 
 # A source is named where it gives at least this share of the light in its central pixel.
 SHARE = 0.1
@@ -40,13 +40,13 @@ def bright_sources(
     limit = LIMITS.local - observation.background_rate
     if rate.size == 0 or len(sources) == 0 or rate.max() <= limit:
         return np.empty(0, dtype=np.int64)
-    arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
+    arrays, own_rate = sources_and_rates(sources, observation)
     ny, nx = rate.shape
     y, x = np.rint(arrays.y), np.rint(arrays.x)
     inside = (y >= 0) & (y < ny) & (x >= 0) & (x < nx)
     there = np.zeros(len(arrays))
     there[inside] = rate[y[inside].astype(np.int64), x[inside].astype(np.int64)]
     optics = Optics(observation.effective_psf, observation.pixel_scale)
-    own = peaks(optics, arrays, arrays.flux * observation.cps_per_flux)
+    own = peaks(optics, arrays, own_rate)
     rows = np.flatnonzero((there > limit) & (own >= SHARE * there))
     return rows[np.argsort(-there[rows], kind="stable")].astype(np.int64)

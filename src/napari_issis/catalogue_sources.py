@@ -19,7 +19,7 @@ from .sources import COLUMNS, FLUX_UNIT, KINDS, check_sources
 
 Array = NDArray[np.float64]
 
-OWN = (*COLUMNS, "n")
+OWN = (*COLUMNS, "n", "spectrum")
 # Units of a column that comes without one.
 DEFAULT_UNITS = {
     "x": u.pix,
@@ -69,6 +69,7 @@ def to_sources(table: Table, observation: Observation | None) -> tuple[QTable, t
     reading.flux()
     reading.shape()
     reading.kind()
+    reading.spectrum()
     return reading.result()
 
 
@@ -251,6 +252,15 @@ class _Reading:
         extended = self.new["kind"] != "point"
         if extended.any() and "r_half" in self.new:
             self.round_where_missing(extended)
+
+    def spectrum(self) -> None:
+        """Take texts in a column of just this name; numbers in it mean something else."""
+        if "spectrum" not in self.table.colnames:
+            return
+        values, mask = _unmasked(self.table["spectrum"])
+        if values.dtype.kind in "US" or mask.all():
+            texts = np.where(mask, "", values.astype(str))
+            self.put("spectrum", texts, "spectrum")
 
     def round_where_missing(self, extended: NDArray[np.bool_]) -> None:
         """Take galaxies for round where the catalogue says nothing of their shape."""

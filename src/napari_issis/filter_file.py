@@ -11,6 +11,7 @@ import astropy.units as u
 import numpy as np
 from astropy.io import fits
 from astropy.table import QTable, Table
+from numpy.typing import NDArray
 
 from .filters import Filter
 from .fits_table import open_fits, read_table
@@ -18,8 +19,10 @@ from .fits_table import open_fits, read_table
 FITS_SUFFIXES = (".fits", ".fit", ".fts")
 COLUMNS = {
     "wavelength": ("wavelength", "wave", "lambda", "lam", "wl"),
+    "flux": ("flux", "flam", "flambda"),
     "transmission": ("transmission", "transmittance", "throughput", "trans"),
 }
+PER_WAVELENGTH = u.erg / u.s / u.cm**2 / u.AA
 # Spellings in the name of a column that astropy does not know or takes for something else.
 UNITS = {"a": u.AA, "aa": u.AA, "angstroms": u.AA, "microns": u.um}
 
@@ -51,6 +54,38 @@ def read_filter(path: str | os.PathLike[str], name: str | None = None) -> Filter
         wavelength, transmission = _column(table, "wavelength"), _column(table, "transmission")
         return Filter(path.stem if name is None else name, wavelength, transmission)
     except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
+def read_curve(path: Path, what: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Read wavelengths in angstrom and fluxes per wavelength from a table.
+
+    Parameters
+    ----------
+    path : Path
+        As of `read_filter`.
+    what : {"flux"}
+        The second column. In a unit per frequency it is converted to one per wavelength.
+
+    Raises
+    ------
+    ValueError
+        If the file holds no such table; the message names the file.
+    OSError
+        If the file cannot be opened.
+    """
+    table = _read_table(path)
+    try:
+        at, values = _column(table, "wavelength"), _column(table, what)
+        if not at.unit.is_equivalent(u.AA):
+            raise ValueError(f"the wavelengths are in {at.unit}, not in Angstrom.")
+        wavelength = at.to(u.AA)
+        if hasattr(values, "unit"):
+            if not values.unit.is_equivalent(PER_WAVELENGTH, u.spectral_density(1 * u.AA)):
+                raise ValueError(f"the flux is in {values.unit}, which is no flux density.")
+            values = values.to_value(PER_WAVELENGTH, u.spectral_density(wavelength))
+        return np.array(wavelength.value, dtype=np.float64), np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
         raise ValueError(f"{path}: {error}") from error
 
 

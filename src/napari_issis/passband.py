@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
@@ -111,6 +112,11 @@ class Passband:
         """Count rate of a spectrum in photon s-1 cm-2 A-1, cps; else as `continuum_rate`."""
         nodes, weights = self._quadrature(wavelength)
         return self.area * float(weights @ np.interp(nodes, wavelength, photons))
+
+    def moment_of(self, spectrum: Callable[[Array], Array], knots: Array) -> float:
+        """Integral of T F lambda over the band, for a spectrum F smooth between ``knots``."""
+        nodes, weights = self._quadrature(knots)
+        return float(weights @ (spectrum(nodes) * nodes))
 
     def _moment(self, power: int) -> float:
         """Integral of T lambda^power over the band."""

@@ -13,14 +13,14 @@ AB_ZERO = -48.6
 LIGHT = 2.99792458e18
 
 
-def ab_magnitude(flux: ArrayLike, pivot: float) -> Array:
+def ab_magnitude(flux: ArrayLike, pivot: float | Array) -> Array:
     """Return the AB magnitudes of fluxes.
 
     Parameters
     ----------
     flux : array_like
         In erg s-1 cm-2 A-1, 0 or more.
-    pivot : float
+    pivot : float or ndarray
         Pivot wavelength of the channel, angstrom.
 
     Returns
@@ -32,14 +32,14 @@ def ab_magnitude(flux: ArrayLike, pivot: float) -> Array:
         return -2.5 * np.log10(np.asarray(flux, dtype=np.float64) * (pivot**2 / LIGHT)) + AB_ZERO
 
 
-def flux_of_ab_magnitude(magnitude: ArrayLike, pivot: float) -> Array:
+def flux_of_ab_magnitude(magnitude: ArrayLike, pivot: float | Array) -> Array:
     """Return the fluxes of AB magnitudes: the inverse of `ab_magnitude`.
 
     Parameters
     ----------
     magnitude : array_like
         AB magnitudes.
-    pivot : float
+    pivot : float or ndarray
         Pivot wavelength of the channel, angstrom.
 
     Returns

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from .observation import Observation
 from .render.optics import Optics
 from .render.profiles import disc_transform, sersic_transform
-from .sources import SourceArrays, check_sources
+from .source_rates import sources_and_rates
+from .sources import SourceArrays
 
 Array = NDArray[np.float64]
 
@@ -21,8 +22,8 @@ ANGLES = 24
 
 def expected_counts(sources: Table, observation: Observation) -> Array:
     """Return the counts that each source sends to the detector in all, shape (n,)."""
-    counts: Array = _arrays(sources, observation).flux * observation.cps_per_flux
-    return counts * observation.exposure
+    _, rate = sources_and_rates(sources, observation)
+    return rate * observation.exposure
 
 
 def signal_to_noise(sources: Table, observation: Observation) -> Array:
@@ -48,8 +49,8 @@ def signal_to_noise(sources: Table, observation: Observation) -> Array:
     noise from the sky as A = 1 / sum(p^2) of its pixels hold, p being the share of its light
     in each.
     """
-    arrays = _arrays(sources, observation)
-    counts = expected_counts(sources, observation)
+    arrays, rate = sources_and_rates(sources, observation)
+    counts = rate * observation.exposure
     optics = Optics(observation.effective_psf, observation.pixel_scale)
     area = noise_areas(optics, arrays)
     sky = observation.background_rate * observation.exposure
@@ -94,7 +95,3 @@ def _weights(optics: Optics) -> tuple[Array, Array]:
     weight = 2 * np.pi * k**2 * squared * np.log(k[1] / k[0])
     weight[-1] *= 0.5
     return k, weight
-
-
-def _arrays(sources: Table, observation: Observation) -> SourceArrays:
-    return check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)

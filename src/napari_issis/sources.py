@@ -11,6 +11,7 @@ from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .instrument import PIXEL_SCALE
+from .spectra import Spectrum, parse_spectrum
 
 Array = NDArray[np.float64]
 
@@ -66,6 +67,7 @@ def source(
     ellipticity: float = DEFAULT_ELLIPTICITY,
     pa: Any = DEFAULT_PA,
     n: float | None = None,
+    spectrum: str | Spectrum | None = None,
 ) -> QTable:
     """Make a source table of one row.
 
@@ -85,11 +87,14 @@ def source(
         Position angle of the major axis in degrees, from +y counter-clockwise towards -x.
     n : float, optional
         Sersic index, 0.5 to 8; for kind ``sersic`` only.
+    spectrum : str or Spectrum, optional
+        The spectrum, such as ``"blackbody(30000 K)"``; see
+        `napari_issis.spectra.parse_spectrum`. Flat by default.
 
     Returns
     -------
     astropy.table.QTable
-        Columns ``kind x y flux r_half ellipticity pa`` (and ``n``). Join tables with
+        Columns ``kind x y flux r_half ellipticity pa`` (and ``n``, ``spectrum``). Join tables with
         `astropy.table.vstack`.
 
     Raises
@@ -114,13 +119,15 @@ def source(
     }
     if n is not None:
         columns["n"] = [_plain("n", n, u.dimensionless_unscaled)]
+    if spectrum is not None:
+        columns["spectrum"] = [str(spectrum)]
     table = QTable(columns)
     check_sources(table)
     return table
 
 
 def check_sources(
-    table: Table, *, pivot: float | None = None, pixel_scale: float = PIXEL_SCALE
+    table: Table, *, pivot: float | Array | None = None, pixel_scale: float = PIXEL_SCALE
 ) -> SourceArrays:
     """Check a source table and return its values as plain arrays.
 
@@ -129,7 +136,7 @@ def check_sources(
     table : astropy.table.Table
         A source table. Columns without a unit are taken in pixels, degrees and
         erg s-1 cm-2 A-1.
-    pivot : float, optional
+    pivot : float or ndarray, shape (n,), optional
         Wavelength in angstrom at which AB magnitudes become fluxes; without it magnitudes
         are checked, and converted at 2500 A.
     pixel_scale : float
@@ -167,7 +174,7 @@ def check_sources(
     for name, position in (("x", x), ("y", y)):
         near = np.abs(position) <= FARTHEST
         _require(name, position, near, everything, f"within {FARTHEST:g} pixels")
-    flux = _column(table, "flux", FLUX_UNIT, everything, pivot=pivot or 2500.0)
+    flux = _column(table, "flux", FLUX_UNIT, everything, pivot=2500.0 if pivot is None else pivot)
     good = (flux >= 0) & (flux <= BRIGHTEST)
     _require("flux", flux, good, everything, f"in [0, {BRIGHTEST:g}] erg s-1 cm-2 A-1")
     r_half = _column(table, "r_half", u.pix, extended, pixel_scale=pixel_scale)
@@ -192,7 +199,49 @@ def check_sources(
         low, high = INDEX_RANGE
         _require("n", n, (n >= low) & (n <= high), sersic, f"in [{low}, {high}]")
         index[sersic] = n[sersic]
+    spectra_of(table)
     return SourceArrays(kind, x, y, flux, r_half, ellipticity, pa, index)
+
+
+def spectra_of(table: Table) -> list[tuple[Spectrum, NDArray[np.intp]]]:
+    """Spectra that occur in a source table, each with its rows; none if it has no such column.
+
+    Raises
+    ------
+    ValueError
+        If a text is no spectrum; the message names the row.
+    ImportError
+        If there is reddening and ``dust_extinction`` is not installed.
+    """
+    texts = spectrum_texts(table)
+    if texts is None or not texts.size:
+        return []
+    _, which = np.unique(texts, return_inverse=True)
+    order = np.argsort(which, kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(which))[:-1])
+    found = []
+    for rows in sorted(groups, key=lambda rows: int(rows[0])):
+        try:
+            found.append((parse_spectrum(str(texts[rows[0]])), rows))
+        except ValueError as error:
+            raise ValueError(f"row {rows[0]}, spectrum: {error}") from None
+    return found
+
+
+def spectrum_texts(table: Table) -> NDArray[np.str_] | None:
+    """Texts of the spectra of a source table, shape (n,); None if there is no such column.
+
+    A missing value is an empty text, that is the flat spectrum.
+    """
+    if not isinstance(table, Table) or "spectrum" not in table.colnames:
+        return None
+    column = table["spectrum"]
+    if not hasattr(column, "mask") and column.dtype.kind == "U":
+        return np.char.strip(np.asarray(column))
+    mask = np.asarray(getattr(column, "mask", np.zeros(len(table), dtype=bool)))
+    values = np.asarray(getattr(column, "value", column))
+    texts = ["" if gone else str(v).strip() for v, gone in zip(values, mask, strict=True)]
+    return np.array(texts, dtype=np.str_)
 
 
 def empty_sources() -> QTable:
@@ -220,7 +269,7 @@ def _column(
     unit: u.UnitBase,
     used: NDArray[np.bool_],
     *,
-    pivot: float | None = None,
+    pivot: float | Array | None = None,
     pixel_scale: float | None = None,
 ) -> Array:
     """Values of a column in ``unit``; 0 in rows that do not use it; errors name the row."""

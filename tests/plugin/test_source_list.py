@@ -14,7 +14,7 @@ from test_scene_edit import assert_consistent
 
 from napari_issis import random_sources, simulate, source
 from napari_issis.exposure import same_table
-from napari_issis.plugin.source_columns import COLUMNS, from_text, shown_values, to_text
+from napari_issis.plugin.source_columns import COLUMNS, TEXTS, from_text, shown_values, to_text
 from napari_issis.plugin.source_list import SourceList
 from napari_issis.plugin.units import Units
 
@@ -68,10 +68,67 @@ def test_sorting(listed, name, order):
     shown = [
         listed.model.index(row, PLACE[name]).data(Qt.ItemDataRole.EditRole) for row in range(4)
     ]
-    values = shown if name == "kind" else [float(value) for value in shown if value]
+    values = shown if name in TEXTS else [float(value) for value in shown if value]
     assert values == sorted(values, reverse=order == Qt.SortOrder.DescendingOrder)
     assert all(value == "" for value in shown[len(values) :])
     assert sorted(listed.model.order) == [0, 1, 2, 3]
+
+
+def test_a_spectrum_typed_into_the_list(scene, listed):
+    """Catches text cut to the width of the old one, lost by undo, drag and copies, or lightless."""
+    long = "powerlaw(-1.5, z=0.5, at=2512.5)"
+    typed(listed, 0, "spectrum", "blackbody(9000)")
+    assert list(scene.sources["spectrum"]) == ["blackbody(9000)", "flat", "flat", "flat"]
+    typed(listed, 1, "spectrum", long)
+    assert cell(listed, 1, "spectrum") == long
+    before = float(listed.model.values["counts"][0])
+    table = scene.sources
+    table["x"][0] += 1
+    scene.change(table)
+    listed.view.selectAll()
+    listed.copy()
+    listed.paste()
+    assert list(scene.sources["spectrum"]) == 2 * ["blackbody(9000)", long, "flat", "flat"]
+    scene.undo()
+    scene.undo()
+    scene.undo()
+    assert list(scene.sources["spectrum"]) == ["blackbody(9000)", "flat", "flat", "flat"]
+    scene.undo()
+    assert "spectrum" not in scene.sources.colnames
+    scene.redo()
+    listed.refresh()
+    # normalised over the band: as many counts until a filter comes in
+    assert before == pytest.approx(2.28e4, rel=1e-3)
+    typed(listed, 2, "spectrum", "powerlow(1)")
+    assert "'powerlow(1)' is unknown" in notification_manager.records[-1].message
+    assert cell(listed, 2, "spectrum") == "flat"
+    assert_consistent(scene)
+
+
+def test_a_spectrum_is_kept_by_the_layers(scene, listed, mouse):
+    """Catches a drag or an edited feature of a layer that loses or cuts spectra."""
+    typed(listed, 0, "spectrum", "line(2500 A, 10 A)")
+    x, y = scene.sources["x"][0], scene.sources["y"][0]
+    mouse.drag((x, y), (x + 3, y))
+    assert scene.sources["x"][0] == pytest.approx(x + 3, abs=0.1)
+    assert scene.sources["spectrum"][0] == "line(2500 A, 10 A)"
+    layer = scene.editor.points.layer
+    features = layer.features.copy()
+    assert list(features["spectrum"]) == ["line(2500 A, 10 A)", "flat"]
+    features.loc[1, "spectrum"] = "powerlaw(-2.25, z=0.5, at=2512.5)"
+    layer.features = features
+    assert scene.sources["spectrum"][1] == "powerlaw(-2.25, z=0.5, at=2512.5)"
+    assert_consistent(scene)
+
+
+def test_a_channel_without_light_is_refused(scene, listed, tmp_path):
+    """Catches a scene that takes a channel in which it cannot be simulated."""
+    path = tmp_path / "star.csv"
+    path.write_text("wavelength_A,flux\n2000,1\n3000,1\n")
+    typed(listed, 0, "spectrum", f"table({path})")
+    with pytest.raises(ValueError, match=r"row 0, spectrum: table.* has no light in FUV, 1150 to"):
+        scene.observation = scene.observation.replace(channel="FUV")
+    assert scene.observation.channel == "NUV"
 
 
 def test_selecting_here_and_there(scene, listed, mouse):

@@ -12,6 +12,8 @@ from napari.utils.notifications import show_error, show_warning
 from numpy.typing import NDArray
 
 from ..exposure import same_table
+from ..observation import Observation
+from ..source_rates import flux_pivots
 from ..sources import (
     DEFAULT_ELLIPTICITY,
     DEFAULT_FLUX,
@@ -23,7 +25,7 @@ from ..sources import (
 from .history import History, SourceState
 from .picture import HeldSources
 from .source_layers import EllipsesLayer, Ids, PointsLayer, SourceLayer
-from .table import join, master_table
+from .table import join, master_table, put
 
 # An ellipse whose semi-axes are shorter (pixels) was clicked, not drawn.
 CLICKED = 1.0
@@ -65,7 +67,7 @@ class SourceEditor:
         self.source_id: Ids = np.empty(0, dtype=np.int64)
         self.version = 0
         self.held: HeldSources | None = None
-        self.pivot = 2500.0
+        self.observation = Observation()
         self.new_source: dict[str, Any] = {
             "kind": "exponential",
             "flux": DEFAULT_FLUX,
@@ -104,7 +106,7 @@ class SourceEditor:
 
     def append(self, table: QTable) -> None:
         """Append the rows of a master table; `write` shows them."""
-        joined = join(self.sources, table, pivot=self.pivot)
+        joined = join(self.sources, table, pivot=flux_pivots(table, self.observation))
         self._set(joined, np.concatenate([self.source_id, self._new_ids(len(table))]))
 
     def remove(self, ids: Iterable[int]) -> None:
@@ -375,13 +377,12 @@ class SourceEditor:
         part = view.adopt(self.sources[places], rows, before)
         table = self.sources.copy()
         for name in part.colnames:
-            if name not in table.colnames:
-                table[name] = np.full(len(table), np.nan)
-            table[name][places] = part[name]
+            put(table, name, places, part[name])
         kept = ~mine | np.isin(self.source_id, surviving)
         both = table[kept]
         for row in fresh:
-            both = join(both, self._drawn(view, row), pivot=self.pivot)
+            drawn = self._drawn(view, row)
+            both = join(both, drawn, pivot=flux_pivots(drawn, self.observation))
         # From here on nothing can fail.
         self._bury(~kept)
         ids = self._new_ids(len(fresh))

@@ -15,11 +15,12 @@ from astropy import units as u
 from astropy.table import QTable
 from numpy.typing import NDArray
 
-from ..sources import check_sources
+from ..sources import check_sources, spectrum_texts
+from .table import put
 
 Array = NDArray[np.float64]
 
-FEATURES = ("kind", "x", "y", "flux", "r_half", "ellipticity", "pa", "n")
+FEATURES = ("kind", "x", "y", "flux", "r_half", "ellipticity", "pa", "n", "spectrum")
 # Semi-axes below half a pixel are drawn by a slip of the mouse, not on purpose.
 MIN_SEMI_AXIS = 0.5
 
@@ -141,15 +142,19 @@ def adopt_shapes(table: QTable, written: Array, corners: Array) -> QTable:
 def features(table: QTable, source_id: NDArray[np.int64]) -> pd.DataFrame:
     """Rows of the source table as layer features, with a stable ``source_id``.
 
-    Values are those of the table's columns, in its units; ``n`` is NaN where there is none.
+    Values are those of the table's columns, in its units; ``n`` is NaN where there is none, the
+    spectrum ``flat``.
     """
     columns: dict[str, Any] = {"kind": np.asarray(table["kind"], dtype=str).astype(object)}
-    for name in FEATURES[1:]:
+    for name in FEATURES[1:-1]:
         if name in table.colnames:
             column = table[name]
             columns[name] = np.array(getattr(column, "value", column), dtype=np.float64)
         else:
             columns[name] = np.full(len(table), np.nan)
+    texts = spectrum_texts(table)
+    spectra = np.full(len(table), "flat") if texts is None else texts
+    columns["spectrum"] = spectra.astype(object)
     columns["source_id"] = np.asarray(source_id, dtype=np.int64)
     return pd.DataFrame(columns)
 
@@ -171,6 +176,11 @@ def adopt_features(table: QTable, written: pd.DataFrame, current: pd.DataFrame) 
             changed = old.astype(str) != new.astype(str)
             if changed.any():
                 table["kind"] = np.where(changed, new.astype(str), table["kind"]).astype("U13")
+            continue
+        if name == "spectrum":
+            changed = old.astype(str) != new.astype(str)
+            if changed.any():
+                put(table, name, changed, new[changed])
             continue
         new = new.astype(np.float64)
         changed = ~((old == new) | (np.isnan(old.astype(np.float64)) & np.isnan(new)))

@@ -18,6 +18,7 @@ from qtpy.QtWidgets import QApplication
 from ..exposure import Exposure
 from ..instrument import PIXEL_SCALE
 from ..observation import Observation
+from ..source_rates import rates_per_flux
 from ..sources import source
 from .counts_layer import CountsLayer
 from .editor import SourceEditor
@@ -139,7 +140,7 @@ class Scene:
 
     @sources.setter
     def sources(self, table: Table) -> None:
-        self.editor.replace(master_table(table))
+        self.editor.replace(self._checked(table))
         self._sources_set()
         points = self.editor.points.holds(self.editor.sources["kind"])
         view = self.editor.points if 2 * points.sum() > points.size else self.editor.ellipses
@@ -166,9 +167,11 @@ class Scene:
             raise ValueError(f"observation is {observation!r}; give an Observation.")
         if observation == self._observation:
             return
+        # refused before anything has changed, if a source has no light in a new channel
+        rates_per_flux(self.editor.sources, observation)
         reframed = observation.shape != self._observation.shape
         self._observation = observation
-        self.editor.pivot = observation.pivot
+        self.editor.observation = observation
         if reframed:
             self._fit_marks()
             # a view that stays as it is shows the new frame at another zoom than the whole
@@ -250,7 +253,7 @@ class Scene:
             If the table has an error; the scene stays as it was.
         """
         self.editor.take_over()
-        self.editor.append(master_table(table))
+        self.editor.append(self._checked(table))
         self._sources_set()
 
     def change(self, table: Table) -> None:
@@ -267,8 +270,14 @@ class Scene:
                 f"the table has {len(table)} rows, the scene {len(self.editor.sources)} sources; "
                 "use `sources` or `add` to change their number."
             )
-        self.editor.change(master_table(table))
+        self.editor.change(self._checked(table))
         self._show_sources()
+
+    def _checked(self, table: Table) -> QTable:
+        """Master table of sources that all have a count rate in this observation."""
+        master = master_table(table)
+        rates_per_flux(master, self._observation)
+        return master
 
     def remove(self, ids: Iterable[int]) -> None:
         """Remove the sources with these ids (of `SourceEditor.source_id`)."""

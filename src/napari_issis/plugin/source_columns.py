@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..observation import Observation
 from ..source_counts import expected_counts, signal_to_noise
+from ..source_rates import flux_pivots, rates_per_flux
 from ..sources import (
     DEFAULT_ELLIPTICITY,
     DEFAULT_FLUX,
@@ -23,13 +24,15 @@ from ..sources import (
     FLUX_UNIT,
     KINDS,
     check_sources,
+    spectrum_texts,
 )
 from .number_field import number_text, read_number
-from .table import master_table
+from .table import master_table, put
 from .units import FLUX_LABELS, LENGTH_LABELS, Units
 
 Array = NDArray[np.float64]
 DEFAULT_INDEX = 2.0
+TEXTS = ("kind", "spectrum")
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,14 @@ COLUMNS = (
     Column("n", "n", ".3g", "sersic", "Sérsic index"),
     Column("counts", "counts", ".4g", "all", "Counts in the exposure, all its light", False),
     Column("snr", "S/N", ".3g", "all", "Signal-to-noise ratio, alone on the sky", False),
+    Column(
+        "spectrum",
+        "spectrum",
+        "",
+        "all",
+        "flat, powerlaw(-1.5), blackbody(30000 K), line(1550 A, 10 A) or table(star.ecsv); with "
+        "z=, ebv= and at= (angstrom), where F is given",
+    ),
 )
 
 
@@ -96,7 +107,8 @@ def heading(column: Column, units: Units) -> str:
 
 def shown_values(table: QTable, observation: Observation, units: Units) -> dict[str, Any]:
     """Values of all columns in the units shown, each of shape (n,); NaN where there is none."""
-    pivot = observation.pivot
+    pivot = flux_pivots(table, observation)
+    texts = spectrum_texts(table)
     arrays = check_sources(table, pivot=pivot, pixel_scale=observation.pixel_scale)
     extended = arrays.kind != "point"
     return {
@@ -112,19 +124,20 @@ def shown_values(table: QTable, observation: Observation, units: Units) -> dict[
         "n": np.where(arrays.kind == "sersic", arrays.index, np.nan),
         "counts": expected_counts(table, observation),
         "snr": signal_to_noise(table, observation),
+        "spectrum": np.full(len(table), "flat") if texts is None else texts,
     }
 
 
 def text(column: Column, value: Any) -> str:
     """Return a value as the list shows it."""
-    if column.name == "kind":
+    if column.name in TEXTS:
         return str(value)
     return "–" if np.isnan(value) else f"{value:{column.form}}"
 
 
 def exact_text(column: Column, value: Any) -> str:
     """Return a value with all its digits, as it is edited and copied; empty if there is none."""
-    if column.name == "kind":
+    if column.name in TEXTS:
         return str(value)
     return "" if np.isnan(value) else number_text(float(value))
 
@@ -144,23 +157,25 @@ def changed(
         one["kind"] = np.array([typed], dtype="U13")
         if typed in KINDS:
             one = _with_structure(one)
+    elif name == "spectrum":
+        if typed.strip() or "spectrum" in table.colnames:
+            put(one, name, 0, typed.strip() or "flat")
     else:
         _set(one, name, read_number(name, typed), observation, units)
     try:
-        check_sources(one, pivot=observation.pivot)
-    except ValueError as error:
+        check_sources(one)
+        rates_per_flux(one, observation)
+    except (ImportError, ValueError) as error:
         raise ValueError(str(error).removeprefix("row 0, ")) from None
     table = table.copy()
     for column in one.colnames:
-        if column not in table.colnames:
-            table[column] = np.full(len(table), np.nan)
-        table[column][row] = one[column][0]
+        put(table, column, row, one[column][0])
     return table
 
 
 def _set(one: QTable, name: str, number: float, observation: Observation, units: Units) -> None:
-    pivot = observation.pivot
     if name == "flux":
+        pivot = float(np.atleast_1d(flux_pivots(one, observation))[0])
         unit = one["flux"].unit
         flux = units.read_flux(number, pivot)
         if flux == 0 and unit != FLUX_UNIT:
@@ -257,7 +272,8 @@ def from_text(pasted: str, observation: Observation, units: Units) -> QTable:
             raise ValueError(f"line {number} of the text: {error}") from None
     if not rows:
         raise ValueError("the text holds no source; it has headings only.")
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    named = {name: None for row in rows for name in row}
+    columns = {name: np.array([row.get(name, "flat") for row in rows]) for name in named}
     columns["flux"] = columns["flux"] * FLUX_UNIT
     columns["r_half"] = columns["r_half"] * u.pix
     columns["pa"] = columns["pa"] * u.deg
@@ -283,7 +299,9 @@ def _row(row: dict[str, str], observation: Observation, units: Units) -> dict[st
     def number(name: str, default: float) -> float:
         return read_number(name, row[name]) if name in row else default
 
-    pivot = observation.pivot
+    texts = {"spectrum": row["spectrum"]} if "spectrum" in row else {}
+    own = flux_pivots(QTable({name: [text] for name, text in texts.items()}), observation)
+    pivot = float(np.atleast_1d(own)[0])
     flux = units.read_flux(number("flux", 0.0), pivot) if "flux" in row else DEFAULT_FLUX
     r_half = number("r_half", np.nan)
     return {
@@ -297,4 +315,5 @@ def _row(row: dict[str, str], observation: Observation, units: Units) -> dict[st
         "ellipticity": number("ellipticity", DEFAULT_ELLIPTICITY),
         "pa": number("pa", DEFAULT_PA),
         "n": number("n", np.nan),
+        **texts,
     }

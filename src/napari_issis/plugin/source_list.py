@@ -42,7 +42,7 @@ from .source_model import SourceModel
 # Milliseconds between two updates during a drag.
 REST = 100
 # Characters that the columns are wide enough for.
-WIDTHS = {"kind": 20, "flux": 18, "counts": 11}
+WIDTHS = {"kind": 20, "flux": 18, "counts": 11, "spectrum": 30}
 TABLES = f"Source tables ({' '.join('*' + suffix for suffix in SUFFIXES)})"
 CATALOGUES = f"Catalogues ({' '.join('*' + suffix for suffix in READABLE)})"
 

@@ -12,7 +12,7 @@ from qtpy.QtGui import QColor
 
 from .layer_styles import kind_color
 from .scene import Scene
-from .source_columns import COLUMNS, changed, exact_text, heading, shown_values, text
+from .source_columns import COLUMNS, TEXTS, changed, exact_text, heading, shown_values, text
 
 Rows = NDArray[np.intp]
 Role = Qt.ItemDataRole
@@ -119,7 +119,7 @@ class SourceModel(QAbstractTableModel):  # type: ignore[misc]
             return text(column, value)
         if role == Role.EditRole:
             return exact_text(column, value)
-        if role == Role.TextAlignmentRole and column.name != "kind":
+        if role == Role.TextAlignmentRole and column.name not in TEXTS:
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         if role == Role.DecorationRole and column.name == "kind":
             return QColor(kind_color(str(value)))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from astropy import units as u
 from astropy.table import QTable, Table, vstack
+from numpy.typing import NDArray
 
-from ..sources import FLUX_UNIT, check_sources
+from ..sources import FLUX_UNIT, check_sources, spectrum_texts
 
 STRUCTURE_UNITS = {"r_half": u.pix, "ellipticity": None, "pa": u.deg}
 
@@ -23,7 +26,11 @@ def master_table(table: Table) -> QTable:
     ValueError
         If the table is not a source table; the message names row, column and value.
     """
-    arrays = check_sources(table)
+    try:
+        arrays = check_sources(table)
+    except ImportError as error:
+        # of a library for spectra: in the GUI an error like any other of the table
+        raise ValueError(str(error)) from error
     master = QTable(table, copy=True)
     extended = arrays.kind != "point"
     width = max([13, *(len(kind) for kind in arrays.kind)])
@@ -38,14 +45,35 @@ def master_table(table: Table) -> QTable:
     if "n" in table.colnames:
         sersic = arrays.kind == "sersic"
         master["n"] = np.where(sersic, arrays.index, _plain(table, "n", None))
+    texts = spectrum_texts(table)
+    if texts is not None:
+        master["spectrum"] = np.array([text or "flat" for text in texts], dtype=np.str_)
     return master
 
 
-def join(first: QTable, second: QTable, *, pivot: float) -> QTable:
+def put(table: QTable, name: str, rows: Any, values: Any) -> None:
+    """Put values into rows of a column, which is made if the table lacks it.
+
+    Other sources then have no number there, and the flat spectrum. Text of any length fits.
+    """
+    if name == "spectrum":
+        texts = spectrum_texts(table)
+        column = (
+            np.full(len(table), "flat", dtype=object) if texts is None else texts.astype(object)
+        )
+        column[rows] = values
+        table[name] = np.array([str(text) for text in column], dtype=np.str_)
+        return
+    if name not in table.colnames:
+        table[name] = np.full(len(table), np.nan)
+    table[name][rows] = values
+
+
+def join(first: QTable, second: QTable, *, pivot: float | NDArray[np.float64]) -> QTable:
     """Append the rows of one master table to another.
 
     The flux of the second is converted to the unit of the first at the wavelength ``pivot``
-    (angstrom) where they differ.
+    (angstrom, one number or one for each row) where they differ.
 
     Raises
     ------
@@ -70,6 +98,8 @@ def join(first: QTable, second: QTable, *, pivot: float) -> QTable:
     for one, other in ((first, second), (second, first)):
         if "n" in other.colnames and "n" not in one.colnames:
             one["n"] = np.full(len(one), np.nan)
+        if "spectrum" in other.colnames and "spectrum" not in one.colnames:
+            one["spectrum"] = np.full(len(one), "flat")
     return vstack([first, second], metadata_conflicts="silent")
 
 

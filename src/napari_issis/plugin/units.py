@@ -29,12 +29,12 @@ class FluxScale:
     ----------
     unit : {"flux", "AB mag"}
         erg s-1 cm-2 A-1, or AB magnitudes.
-    pivot : float
+    pivot : float or ndarray
         Wavelength in angstrom of the AB magnitudes, that of `check_sources`.
     """
 
     unit: str = "flux"
-    pivot: float = 0.0
+    pivot: float | Array = 0.0
 
     def __post_init__(self) -> None:
         if self.unit == "flux":
@@ -73,7 +73,7 @@ class FluxScale:
         """
         if self.unit == "flux":
             return number
-        brightest = float(ab_magnitude(BRIGHTEST, self.pivot))
+        brightest = float(np.min(ab_magnitude(BRIGHTEST, self.pivot)))
         if not brightest <= number <= FAINTEST_MAGNITUDE:
             raise ValueError(
                 f"AB magnitude is {number:g}; "
@@ -183,7 +183,7 @@ class Units:
         """The unit of lengths, as labels have it."""
         return LENGTH_LABELS[self._length]
 
-    def flux_scale(self, pivot: float) -> FluxScale:
+    def flux_scale(self, pivot: float | Array) -> FluxScale:
         """Return the scale of fluxes for a channel's pivot wavelength (angstrom)."""
         return FluxScale(self._flux, pivot)
 
@@ -191,7 +191,7 @@ class Units:
         """Return the scale of lengths for a pixel scale (arcsec per pixel)."""
         return LengthScale(self._length, pixel_scale)
 
-    def show_flux(self, flux: ArrayLike, pivot: float) -> Array:
+    def show_flux(self, flux: ArrayLike, pivot: float | Array) -> Array:
         """Return fluxes (erg s-1 cm-2 A-1) as shown; a magnitude of flux 0 is infinite."""
         return self.flux_scale(pivot).show(flux)
 

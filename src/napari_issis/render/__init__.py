@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from ..observation import Observation
 from ..psf import RadialPSF
-from ..sources import SourceArrays, check_sources
+from ..source_rates import sources_and_rates
+from ..sources import SourceArrays
 from .bounds import brightest_pixels, outside, psf_beyond, unseen
 from .direct import add_direct, has_sharp_edge
 from .gaussians import NODES, decompose
@@ -107,8 +108,7 @@ def render(
 
 def arrays_and_rates(sources: Table, observation: Observation) -> tuple[SourceArrays, Array]:
     """Return the sources that are not dark, and their count rates after the filters."""
-    arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
-    rate = arrays.flux * observation.cps_per_flux
+    arrays, rate = sources_and_rates(sources, observation)
     bright = rate > 0
     return arrays.take(bright), rate[bright]
 
