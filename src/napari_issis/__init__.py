@@ -9,6 +9,7 @@ from .cluster_profile import ClusterProfile
 from .drag import Drag
 from .exposure import Exposure, simulate
 from .filters import Filter
+from .forecast import forecast
 from .image_psf import ImagePSF
 from .limits import CountRateWarning
 from .observation import Observation
@@ -61,6 +62,7 @@ __all__ = [
     "Sky",
     "TelescopePSF",
     "count_rate",
+    "forecast",
     "random_sources",
     "read_catalogue",
     "read_image",
