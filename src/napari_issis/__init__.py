@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from .cluster_profile import ClusterProfile
 from .drag import Drag
 from .exposure import Exposure, simulate
+from .exposure_goal import exposure_for
 from .filters import Filter
 from .forecast import forecast
 from .image_psf import ImagePSF
@@ -62,6 +63,7 @@ __all__ = [
     "Sky",
     "TelescopePSF",
     "count_rate",
+    "exposure_for",
     "forecast",
     "random_sources",
     "read_catalogue",

@@ -114,7 +114,7 @@ def _derivatives(
 
 
 def _scaled(part: Derivatives, rate: float) -> Array:
-    """Derivatives of the count rate: by the rate itself, and by what scales with the rate."""
+    """Scale derivatives of the image to those of the count rate of a source of that rate."""
     scale = np.full(len(part.images), rate)
     scale[0] = 1.0
     scaled: Array = part.images * scale[:, None, None]
@@ -255,5 +255,10 @@ def _alone(part: Derivatives | None, rate: float, sky: float) -> float:
     if not expected.max() > 0:
         return np.inf
     matrix = (images / expected) @ images.T
-    values, _ = _invert(coo_array(matrix), np.array([0, len(matrix)]))
-    return float(values[0])
+    norm = np.sqrt(np.diagonal(matrix))
+    used = norm > 0
+    if not used[0]:
+        return np.inf
+    scaled = matrix[np.ix_(used, used)] / norm[used] / norm[used][:, None]
+    inverse, infinite = _inverse(scaled)
+    return np.inf if infinite[0] else float(inverse[0, 0] / norm[0] ** 2)
