@@ -9,7 +9,9 @@ from .cluster_profile import ClusterProfile
 from .detector import Detector
 from .drag import Drag
 from .exposure import Exposure, simulate
+from .exposure_goal import exposure_for
 from .filters import Filter
+from .forecast import forecast
 from .image_psf import ImagePSF
 from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
@@ -76,6 +78,8 @@ __all__ = [
     "TelescopePSF",
     "count_rate",
     "expected_counts",
+    "exposure_for",
+    "forecast",
     "lens_images",
     "lensed_quasar",
     "lensed_quasars",

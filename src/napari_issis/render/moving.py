@@ -100,15 +100,15 @@ def moving_source(
     if has_sharp_edge(optics, allowed / rate, optics.extent + 50.0, 1.0):
         return None
     share = SHARE * allowed
-    half = _half_sizes(optics, one, rate, share)
-    limit = _limit(optics, one, rate, share)
+    half = half_sizes(optics, one, rate, share)
+    limit = highest_frequency(optics, one, rate, share)
     modes = 8 * half[0] * half[1] * limit**2
     if modes > MOST_MODES or half[0] > shape[0] or half[1] > shape[1]:
         return None
     return MovingSource(optics, one, rate, half, limit)
 
 
-def _half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> tuple[int, int]:
+def half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> tuple[int, int]:
     """Half-sizes (y, x) of a window, outside of which the light is below ``share``.
 
     Light arrives there from the source's outskirts and, by the PSF's wings, from its inner
@@ -143,7 +143,7 @@ def _wing(optics: Optics, level: float) -> float:
     return float(RADII[-1] * np.sqrt(envelope[-1] / level))
 
 
-def _limit(optics: Optics, one: SourceArrays, rate: float, share: float) -> float:
+def highest_frequency(optics: Optics, one: SourceArrays, rate: float, share: float) -> float:
     """Frequency beyond which a source's spectrum adds up to less than ``share``."""
     limit = optics.band_limit(1e-3 * min(share * optics.point_area / rate, 1.0))
     k: Array = (np.arange(240.0) + 0.5) * (limit / 240)
