@@ -388,6 +388,7 @@ def test_edges_suit_the_zoom_that_stays_when_the_frame_changes(scene, qtbot):
     scene.viewer.add_points([[0.5, 0.5]])
     camera, layer = scene.viewer.scene.camera, scene.editor.ellipses.layer
     camera.zoom = 8 * 1.5 / (layer.edge_width[0] * 0.036)
+    qtbot.waitUntil(lambda: not scene._zoomed.isActive())
     scene.observation = SMALL.replace(shape=(1024, 1024))
     scene.wait()
     zoom = camera.zoom
