@@ -251,3 +251,20 @@ def test_magnitudes_vary_too():
 def test_bad_input(options, message):
     with pytest.raises(ValueError, match=message):
         sequence(**options)
+
+
+def test_the_detector_acts_on_expected_counts():
+    """Catches a stack that forgets the coincidence loss which `simulate` knows."""
+    lossy = FRAME.replace(detector=ni.Detector(dead_time=1e-2))
+    plan = ni.monitor(TWO, lossy, [0.0], exposures=1)
+    alone = plan.simulate(0)
+    assert np.array_equal(plan.stack("expected").compute()[0], alone.expected)
+    assert np.array_equal(plan.stack().compute()[0], alone.counts)
+
+
+def test_magnitudes_of_a_spectrum_vary_as_its_flux():
+    """Catches a magnitude that is converted at the channel's pivot instead of where it is given."""
+    star = ni.source("point", 12, 10, 20 * u.ABmag, spectrum="powerlaw(-2, at=2000)")
+    plan = ni.monitor(star, FRAME, [0.0], light_curves={0: lambda time: 0.5})
+    whole = ni.expected_counts(star, FRAME)
+    assert ni.expected_counts(plan.exposures[0].sources, FRAME) == pytest.approx(0.5 * whole)

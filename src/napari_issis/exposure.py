@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .counts import checked_seed, poisson_counts
-from .limits import CountRateWarning, count_rate_warnings
+from .limits import warn_of_count_rates
 from .observation import Observation
 from .render import render
 
@@ -139,10 +138,7 @@ def simulate(
     observation = Observation() if observation is None else observation
     seed = checked_seed(seed)
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
-    for message in count_rate_warnings(
-        rate, observation.background_rate, sources=sources, observation=observation
-    ):
-        warnings.warn(message, CountRateWarning, stacklevel=2)
+    warn_of_count_rates(rate, sources, observation)
     return expose(rate, sources, observation, seed=seed, clipped=clipped)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from astropy.table import Table
 
 from .fisher import covariance
-from .limits import CountRateWarning, count_rate_warnings
+from .limits import warn_of_count_rates
 from .observation import Observation
 
 
@@ -95,13 +94,7 @@ def exposure_for(
         relative = np.sqrt(result.variance[chosen, 0]) / rates
         correlation = result.correlation.tocsr()[int(chosen[0]), int(chosen[1])]
         seconds = (relative @ relative - 2 * correlation * relative.prod()) / goal**2
-    for message in count_rate_warnings(
-        result.source_rate,
-        observation.background_rate,
-        sources=sources,
-        observation=observation,
-    ):
-        warnings.warn(message, CountRateWarning, stacklevel=2)
+    warn_of_count_rates(result.source_rate, sources, observation)
     return float(np.max(seconds)) * u.s
 
 

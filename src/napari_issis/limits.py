@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from itertools import combinations_with_replacement
 from math import prod
@@ -75,6 +76,19 @@ def count_rate_warnings(
         filters = OPEN if observation is None else observation.filters
         messages[-1] += f" {_cure(max(total / LIMITS.total, peak / LIMITS.local), filters)}"
     return messages
+
+
+def warn_of_count_rates(
+    rate: NDArray[np.float64], sources: Table, observation: Observation, *, stacklevel: int = 2
+) -> None:
+    """Issue a `CountRateWarning` for each limit that a scene breaks, as `count_rate_warnings`.
+
+    ``stacklevel`` is that of `warnings.warn`, counted from the caller.
+    """
+    for message in count_rate_warnings(
+        rate, observation.background_rate, sources=sources, observation=observation
+    ):
+        warnings.warn(message, CountRateWarning, stacklevel=stacklevel + 1)
 
 
 def _names(sources: Table, rows: NDArray[np.int64]) -> str:

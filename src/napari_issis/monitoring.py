@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,11 +14,19 @@ from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .counts import checked_seed
-from .exposure import Exposure, expose, noise_ready_rate, same_table, simulate
+from .exposure import (
+    Exposure,
+    expected_of_rate,
+    expose,
+    noise_ready_rate,
+    same_table,
+    simulate,
+)
 from .light_curves import LightCurve, flux_factors
-from .limits import CountRateWarning, count_rate_warnings
+from .limits import warn_of_count_rates
 from .moved_frame import move_frame
 from .observation import Observation
+from .source_rates import sources_and_rates
 from .sources import FLUX_UNIT, check_sources
 
 Offset = tuple[float, float]
@@ -330,7 +337,7 @@ def monitor(
         table = QTable(sources, copy=True)
         changed = _changed(observation, epoch, number)
         if not np.all(factors[number] == 1):
-            flux = check_sources(sources, pivot=changed.pivot).flux
+            flux = sources_and_rates(sources, changed)[0].flux
             table["flux"] = flux * factors[number] * FLUX_UNIT
         off = _offset(epoch.offset)
         for k, step in enumerate(steps):
@@ -403,10 +410,7 @@ def _rate(
     sources: QTable, observation: Observation, tolerance: float | None
 ) -> tuple[NDArray[np.float64], float]:
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
-    for message in count_rate_warnings(
-        rate, observation.background_rate, sources=sources, observation=observation
-    ):
-        warnings.warn(message, CountRateWarning, stacklevel=2)
+    warn_of_count_rates(rate, sources, observation)
     return rate, clipped
 
 
@@ -418,7 +422,7 @@ def _image(
     rate: tuple[NDArray[np.float64], float], one: PlannedExposure, image: str
 ) -> NDArray[Any]:
     if image == "expected":
-        return (rate[0] + one.observation.background_rate) * one.observation.exposure
+        return expected_of_rate(rate[0], one.observation)
     return _exposed(rate, one).counts
 
 
