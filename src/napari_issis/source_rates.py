@@ -83,10 +83,21 @@ def flux_pivots(table: Table, observation: Observation) -> float | Array:
         return observation.pivot
     pivots = np.full(len(table), observation.pivot)
     for spectrum, rows in spectra:
-        if spectrum != FLAT:
-            own = spectrum.flux_at
-            pivots[rows] = observation.channel_data.pivot if own is None else own
+        pivots[rows] = flux_pivot(spectrum, observation)
     return pivots
+
+
+def flux_pivot(spectrum: Spectrum | str, observation: Observation) -> float:
+    """Wavelength in angstrom at which AB magnitudes of a spectrum become fluxes.
+
+    As of `flux_pivots`; an empty text is the flat spectrum.
+    """
+    if isinstance(spectrum, str):
+        spectrum = parse_spectrum(spectrum)
+    if spectrum == FLAT:
+        return observation.pivot
+    at = spectrum.flux_at
+    return observation.channel_data.pivot if at is None else at
 
 
 def cps_per_flux(spectrum: Spectrum | str, observation: Observation) -> float:

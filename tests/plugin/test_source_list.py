@@ -381,3 +381,9 @@ def test_ten_thousand_rows(scene, listed):
     assert len(scene.editor.points.layer.selected_data) == 10_000
     # only what is in view
     assert len(asked) < 20_000
+
+
+def test_a_pasted_spectrum_that_is_none_is_named_by_its_line():
+    """Catches a message that names no column, or a row of an inner table."""
+    with pytest.raises(ValueError, match=r"^line 3 of the text: spectrum: 'gold\(3\)' is unknown"):
+        from_text("x\ty\tspectrum\n1\t2\tflat\n3\t4\tgold(3)", SMALL, Units())

@@ -14,7 +14,7 @@ from ..exposure import Exposure
 from ..fits_header import wcs_header
 from ..observation import Observation
 from ..source_counts import expected_counts, signal_to_noise
-from ..source_rates import flux_pivots
+from ..source_rates import flux_pivot
 from ..sources import check_sources, spectrum_texts
 from .units import Units
 
@@ -74,7 +74,9 @@ def source_text(row: Row, observation: Observation, units: Units) -> str:
         What fluxes and radii are shown in.
     """
     table = row.table[[row.index]]
-    pivot = float(np.atleast_1d(flux_pivots(table, observation))[0])
+    texts = spectrum_texts(table)
+    spectrum = "" if texts is None else str(texts[0])
+    pivot = flux_pivot(spectrum, observation)
     one = check_sources(table, pivot=pivot, pixel_scale=observation.pixel_scale)
     kind = str(one.kind[0])
     lines = [
@@ -88,9 +90,8 @@ def source_text(row: Row, observation: Observation, units: Units) -> str:
         lines.append(f"ε {one.ellipticity[0]:.3g}   PA {one.pa[0] % 180:.1f}°")
     if kind == "sersic":
         lines.append(f"n {one.index[0]:.3g}")
-    texts = spectrum_texts(table)
-    if texts is not None and texts[0] not in ("", "flat"):
-        lines.append(str(texts[0]))
+    if spectrum not in ("", "flat"):
+        lines.append(spectrum)
     counts, ratio = expected_counts(table, observation), signal_to_noise(table, observation)
     lines.append(f"{counts[0]:.4g} counts   S/N {ratio[0]:.3g}")
     return "\n".join(lines)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..observation import Observation
 from ..source_counts import expected_counts, signal_to_noise
-from ..source_rates import flux_pivots, rates_per_flux
+from ..source_rates import flux_pivot, flux_pivots, rates_per_flux
 from ..sources import (
     DEFAULT_ELLIPTICITY,
     DEFAULT_FLUX,
@@ -175,7 +175,8 @@ def changed(
 
 def _set(one: QTable, name: str, number: float, observation: Observation, units: Units) -> None:
     if name == "flux":
-        pivot = float(np.atleast_1d(flux_pivots(one, observation))[0])
+        texts = spectrum_texts(one)
+        pivot = flux_pivot("" if texts is None else str(texts[0]), observation)
         unit = one["flux"].unit
         flux = units.read_flux(number, pivot)
         if flux == 0 and unit != FLUX_UNIT:
@@ -300,8 +301,10 @@ def _row(row: dict[str, str], observation: Observation, units: Units) -> dict[st
         return read_number(name, row[name]) if name in row else default
 
     texts = {"spectrum": row["spectrum"]} if "spectrum" in row else {}
-    own = flux_pivots(QTable({name: [text] for name, text in texts.items()}), observation)
-    pivot = float(np.atleast_1d(own)[0])
+    try:
+        pivot = flux_pivot(row.get("spectrum", ""), observation)
+    except ValueError as error:
+        raise ValueError(f"spectrum: {error}") from None
     flux = units.read_flux(number("flux", 0.0), pivot) if "flux" in row else DEFAULT_FLUX
     r_half = number("r_half", np.nan)
     return {
