@@ -12,9 +12,9 @@ from napari.utils.notifications import notification_manager
 from npe2 import PluginManifest
 from qtpy.QtCore import QPoint, QPointF, Qt
 from qtpy.QtGui import QWheelEvent
-from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 from small_scene import SMALL, few_sources
+from typed import enter
 
 from napari_issis import SKIES, Exposure, Filter, random_sources, simulate, source
 from napari_issis.exposure import same_table
@@ -41,13 +41,6 @@ def instrument(scene, qtbot):
     form = InstrumentForm(scene)
     qtbot.addWidget(form)
     return form
-
-
-def enter(field, text):
-    """Type a text as a user does, and press Enter."""
-    field.native.selectAll()
-    QTest.keyClicks(field.native, text)
-    QTest.keyClick(field.native, Qt.Key.Key_Return)
 
 
 def test_defaults_are_the_papers(form):

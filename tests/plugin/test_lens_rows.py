@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from napari.utils.notifications import notification_manager
-from qtpy.QtCore import Qt
-from qtpy.QtTest import QTest
+from typed import enter
 
 from napari_issis import lensed_quasar
 from napari_issis.exposure import same_table
@@ -25,12 +24,6 @@ def form(scene, qtbot):
     form.mode.value = "lens"
     yield form
     form.pause()
-
-
-def enter(field, text):
-    field.native.selectAll()
-    QTest.keyClicks(field.native, text)
-    QTest.keyClick(field.native, Qt.Key.Key_Return)
 
 
 def test_a_press_adds_the_system_and_one_undo_takes_it_back(scene, form):

@@ -13,6 +13,7 @@ from qtpy.QtGui import QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QLabel
 from small_scene import SMALL, few_sources
+from typed import enter
 
 from napari_issis import random_sources, source, star_cluster
 from napari_issis.exposure import same_table
@@ -33,12 +34,6 @@ def form(scene, qtbot):
     form.resume()
     yield form
     form.pause()
-
-
-def enter(field, text):
-    field.native.selectAll()
-    QTest.keyClicks(field.native, text)
-    QTest.keyClick(field.native, Qt.Key.Key_Return)
 
 
 def last_message():

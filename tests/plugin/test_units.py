@@ -5,8 +5,7 @@ from __future__ import annotations
 import astropy.units as u
 import numpy as np
 import pytest
-from qtpy.QtCore import Qt
-from qtpy.QtTest import QTest
+from typed import enter
 
 from napari_issis import Observation
 from napari_issis.plugin.limit_fields import QuantityLimits
@@ -30,12 +29,6 @@ def flux(qapp):
 @pytest.fixture
 def length(qapp):
     return QuantityField("r_half", 20.0, "", LengthScale())
-
-
-def enter(field, text):
-    field.native.selectAll()
-    QTest.keyClicks(field.native, text)
-    QTest.keyClick(field.native, Qt.Key.Key_Return)
 
 
 def by_astropy(magnitude, pivot):
