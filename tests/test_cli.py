@@ -344,7 +344,7 @@ def test_one_image_alone(star, capsys):
     with fits.open("x.fits") as hdus:
         assert len(hdus) == 1
         np.testing.assert_array_equal(hdus[0].data, Exposure.read("whole.fits").expected)
-    assert "no extension SOURCES" in refused(capsys, "simulate", "x.fits", "--output", "y.fits")
+    assert "the file holds no table" in refused(capsys, "simulate", "x.fits", "--output", "y.fits")
 
 
 def test_further_files(star, capsys):
