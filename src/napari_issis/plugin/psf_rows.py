@@ -72,11 +72,11 @@ class PsfRows:
             "the detector's pixel is no part of it"
         )
         self._rows = [
-            form.add("Jitter, blur (″)", self.jitter, self.blur),
-            form.add("Halo share, FWHM (″)", self.share, self.width),
+            form.add("Blurs (″)", self.jitter, self.blur),
+            form.add("Halo (1, ″)", self.share, self.width),
             form.add("", self.own),
         ]
-        form.add_native(QLabel("Light within"), self.read_out)
+        form.add_native(QLabel("Light in ⌀"), self.read_out)
         self._rows.append(self.read_out)
         self._shown: PSF | None = None
         self._jobs = LatestWins(self._show_table, self._failed)
@@ -98,7 +98,7 @@ class PsfRows:
         if observation.psf_assumed:
             text = "assumed, about 0.10″ FWHM; none is published"
         elif blurs:
-            text = "the channel's own but for its blurs; assumed"
+            text = "assumed, with blurs and halo as edited"
         else:
             text = f"{type(observation.psf).__name__}, given by a script"
         self.text.setText(text)
@@ -158,6 +158,8 @@ class PsfRows:
             self._jobs.cancel()
             self.read_out.setText("not measured: the PSF is an image")
             return
+        if not self.read_out.text():
+            self.read_out.setText("…")
         self.read_out.setEnabled(False)
         self._jobs.request(lambda: (psf, psf_text(psf)))
 
@@ -176,7 +178,7 @@ def psf_text(psf: RadialPSF) -> str:
     """Full width at half maximum and encircled energy of a PSF; takes some tenths of a second."""
     table = psf_table(psf, CIRCLES)
     shares = ", ".join(
-        f"⌀ {diameter.value:g}″ {100 * share:.1f} %"
+        f"{diameter.value:g}″ {100 * share:.1f} %"
         for diameter, share in zip(table["diameter"], table["encircled_energy"], strict=True)
     )
     return f"{shares}; FWHM {table.meta['fwhm'].value:.4f}″"
