@@ -9,7 +9,6 @@ from .observation import Observation
 from .psf import TelescopePSF
 
 BLURS = ("jitter_fwhm", "blur_fwhm", "halo_share", "halo_fwhm")
-HALO = ("halo_share", "halo_fwhm")
 
 
 def blurs_of(observation: Observation) -> dict[str, float] | None:
@@ -18,8 +17,8 @@ def blurs_of(observation: Observation) -> dict[str, float] | None:
     Returns
     -------
     dict or None
-        Those of ``jitter_fwhm blur_fwhm halo_share halo_fwhm`` that differ, the two of the halo
-        together; empty for the channel's own PSF. None if the PSF differs in more.
+        Those of ``jitter_fwhm blur_fwhm halo_share halo_fwhm`` that differ; empty for the
+        channel's own PSF. None if the PSF differs in more.
     """
     own = observation.replace(psf=None).effective_psf
     psf = observation.effective_psf
@@ -28,10 +27,7 @@ def blurs_of(observation: Observation) -> dict[str, float] | None:
     values = {name: getattr(psf, name) for name in BLURS}
     if replace(own, **values) != psf:
         return None
-    differ = {name for name in BLURS if values[name] != getattr(own, name)}
-    if differ & set(HALO):
-        differ |= set(HALO)
-    return {name: values[name] for name in BLURS if name in differ}
+    return {name: value for name, value in values.items() if value != getattr(own, name)}
 
 
 def with_blurs(observation: Observation, **blurs: Any) -> Observation:
