@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..exposure import same_table
 from ..observation import Observation
+from ..psf_blurs import blurs_of, with_blurs
 from ..source_rates import flux_pivots
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -133,6 +134,8 @@ class SourceEditor:
     def _restore(self, state: SourceState | None) -> bool:
         if state is None:
             return False
+        if state.blurs is not None and blurs_of(self.observation) is not None:
+            self.observation = with_blurs(self.observation, **state.blurs)
         gone = np.isin(self.source_id, state.source_id, invert=True)
         self._bury(gone)
         self._set(state.sources, state.source_id)
@@ -166,6 +169,12 @@ class SourceEditor:
             self._nudging, self.held, self._untidy = False, None, True
             self.take_over()
 
+    def observe(self, observation: Observation) -> None:
+        """Take over another set-up; a change of its PSF's blurs is a step of the history."""
+        self.observation = observation
+        if self.held is None:
+            self._note()
+
     def _set(self, table: QTable, source_id: Ids) -> None:
         self.end_nudge()
         self.held = None
@@ -179,7 +188,7 @@ class SourceEditor:
         self.history.note(self._state())
 
     def _state(self) -> SourceState:
-        return SourceState(self.sources, self.source_id)
+        return SourceState(self.sources, self.source_id, blurs_of(self.observation))
 
     def _bury(self, gone: NDArray[np.bool_]) -> None:
         """Keep rows that go, for those that come back by paste."""

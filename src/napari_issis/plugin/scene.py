@@ -171,7 +171,7 @@ class Scene:
         rates_per_flux(self.editor.sources, observation)
         reframed = observation.shape != self._observation.shape
         self._observation = observation
-        self.editor.observation = observation
+        self.editor.observe(observation)
         if reframed:
             self._fit_marks()
             # a view that stays as it is shows the new frame at another zoom than the whole
@@ -305,16 +305,21 @@ class Scene:
         self._soon()
 
     def undo(self, event: Any = None) -> None:
-        """Take back the last edit of the sources; nothing while the mouse holds one."""
+        """Take back the last edit of the sources or the PSF; nothing while the mouse holds one."""
         self.editor.take_over()
         if self.editor.undo():
-            self._show_sources()
+            self._restored()
 
     def redo(self, event: Any = None) -> None:
         """Do again the edit that was taken back last."""
         self.editor.take_over()
         if self.editor.redo():
-            self._show_sources()
+            self._restored()
+
+    def _restored(self) -> None:
+        self._show_sources()
+        # undo and redo change the PSF too
+        self.observation = self.editor.observation
 
     def wait(self, timeout: float = 60.0) -> None:
         """Wait until the picture is settled; keeps the window alive meanwhile.
