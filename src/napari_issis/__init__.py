@@ -15,6 +15,7 @@ from .forecast import forecast
 from .image_psf import ImagePSF
 from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
+from .light_curve_fit import fit_light_curves
 from .limits import CountRateWarning
 from .monitoring import Epoch, Monitoring, monitor
 from .observation import Observation
@@ -79,6 +80,7 @@ __all__ = [
     "count_rate",
     "expected_counts",
     "exposure_for",
+    "fit_light_curves",
     "forecast",
     "lens_images",
     "lensed_quasar",

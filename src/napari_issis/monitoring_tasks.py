@@ -57,7 +57,7 @@ def run(
     groups: dict[int, list[int]] = {}
     for index, path in enumerate(paths):
         if path.exists():
-            check_finished(path, plan.exposures[index])
+            read_finished(path, plan.exposures[index])
         else:
             groups.setdefault(plan.exposures[index].render, []).append(index)
     total = len(paths)
@@ -133,7 +133,7 @@ def _write(rate: tuple[NDArray[np.float64], float], one: PlannedExposure, path: 
         _exposed(rate, one).write(path)
     except FileExistsError:
         # A cluster may run a task again whose worker was lost after it had written.
-        check_finished(Path(path), one)
+        read_finished(Path(path), one)
     return path
 
 
@@ -150,18 +150,15 @@ def add_shifted(frames: Sequence[NDArray[Any]], shifts: Sequence[tuple[int, int]
     return total
 
 
-def check_finished(path: Path, one: PlannedExposure) -> None:
-    """Raise a ValueError if a file is not the planned exposure."""
-    from .fits_io import read_scene
-    from .fits_table import open_fits
-
+def read_finished(path: Path, one: PlannedExposure) -> Exposure:
+    """Read the file of an exposure; raise a ValueError if it is not the planned one."""
     try:
-        with open_fits(path) as hdus:
-            sources, observation, seed, _ = read_scene(hdus)
+        exposure = Exposure.read(path)
     except ValueError as error:
         raise ValueError(f"{path} is no finished exposure ({error}); remove it.") from error
-    same = seed == one.seed and observation == one.observation
-    if not (same and same_table(sources, one.sources)):
+    same = exposure.seed == one.seed and exposure.observation == one.observation
+    if not (same and same_table(exposure.sources, one.sources)):
         raise ValueError(
             f"{path} holds an exposure of another sequence; choose another folder, or remove it."
         )
+    return exposure
