@@ -49,23 +49,25 @@ def fit_fluxes(counts: NDArray[np.int64], templates: Array, sky: Array) -> Array
     steps halved until they gain.
     """
     lit = templates.sum(axis=0) > 0
-    counts, templates, sky = counts[lit].astype(np.float64), templates[:, lit], sky[lit]
-    if not counts.size:
+    seen = counts[lit].astype(np.float64)
+    templates, sky = templates[:, lit], sky[lit]
+    if not seen.size:
         return np.zeros(len(templates))
     light = templates.sum(axis=1)
     # evenly shared, and positive, so that the likelihood is finite
-    share = max(float((counts - sky).sum()), 1.0) / len(templates)
-    amplitude = np.divide(share, light, out=np.zeros_like(light), where=light > 0)
+    share = max(float((seen - sky).sum()), 1.0) / len(templates)
+    amplitude: Array = np.divide(share, light, out=np.zeros_like(light), where=light > 0)
     expected = amplitude @ templates + sky
     for _ in range(MOST_STEPS):
-        step, gain = _step(counts, templates, expected)
+        step, gain = _step(seen, templates, expected)
         change = step @ templates
-        part, slack = 1.0, 1e-12 * float(counts.sum() + expected.sum())
-        while not _gains(counts, expected, part * change, slack):
+        part, slack = 1.0, 1e-12 * float(seen.sum() + expected.sum())
+        while not _gains(seen, expected, part * change, slack):
             part *= 0.5
             if part < 1e-12:
                 return amplitude
-        amplitude, expected = amplitude + part * step, expected + part * change
+        amplitude = amplitude + part * step
+        expected = expected + part * change
         if part * part * gain < PRECISION**2:
             return amplitude
     raise RuntimeError(

@@ -55,11 +55,13 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / one.file_name for one in plan.exposures]
     groups: dict[int, list[int]] = {}
+    check, finished = dask.delayed(_check_finished, pure=False), []
     for index, path in enumerate(paths):
         if path.exists():
-            read_finished(path, plan.exposures[index])
+            finished.append(check(str(path), plan.exposures[index]))
         else:
             groups.setdefault(plan.exposures[index].render, []).append(index)
+    dask.compute(*finished)
     total = len(paths)
     done = total - sum(map(len, groups.values()))
     tell = progress or (lambda done, total: None)
@@ -148,6 +150,10 @@ def add_shifted(frames: Sequence[NDArray[Any]], shifts: Sequence[tuple[int, int]
         of = slice(max(-dy, 0), ny + min(-dy, 0)), slice(max(-dx, 0), nx + min(-dx, 0))
         total[to] += frame[of]
     return total
+
+
+def _check_finished(path: str, one: PlannedExposure) -> None:
+    read_finished(Path(path), one)
 
 
 def read_finished(path: Path, one: PlannedExposure) -> Exposure:
