@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .detector import IDEAL
 from .flux_fit import fit_fluxes, flux_errors
-from .monitoring_tasks import read_finished
+from .monitoring_tasks import exposed, rate_of, read_finished
 from .observation import Observation
 from .render import count_rate
 from .source_rates import rates_per_flux, sources_and_rates
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 # Flux in erg s-1 cm-2 A-1 at which templates are rendered; they are scaled afterwards.
 TEMPLATE_FLUX = 1e-15
-# Frames whose templates are kept: those of the dithers of an epoch, mostly.
+# Frames whose templates or rates are kept: those of the dithers of an epoch, mostly.
 KEPT = 16
 # Bytes that the templates of an epoch may take.
 MOST_BYTES = 2e9
@@ -132,7 +132,7 @@ def _check_possible(monitoring: Monitoring, members: list[list[int]]) -> None:
 def _reader(monitoring: Monitoring, counts: Any) -> Callable[[int], NDArray[np.int64]]:
     """Return what gives the counts of an exposure by its place."""
     if counts is None:
-        return lambda index: monitoring.simulate(index).counts
+        return _simulator(monitoring)
     if isinstance(counts, str | os.PathLike):
         folder, ones = Path(counts), monitoring.exposures
         return lambda index: read_finished(folder / ones[index].file_name, ones[index]).counts
@@ -153,6 +153,20 @@ def _reader(monitoring: Monitoring, counts: Any) -> Callable[[int], NDArray[np.i
         return frame
 
     return given
+
+
+def _simulator(monitoring: Monitoring) -> Callable[[int], NDArray[np.int64]]:
+    rates: dict[int, Any] = {}
+
+    def simulated(index: int) -> NDArray[np.int64]:
+        one = monitoring.exposures[index]
+        if one.render not in rates:
+            if len(rates) >= KEPT:
+                rates.clear()
+            rates[one.render] = rate_of(one.sources, one.observation, monitoring.tolerance)
+        return exposed(rates[one.render], one).counts
+
+    return simulated
 
 
 def _templates(one: PlannedExposure, arrays: SourceArrays, kept: dict[Hashable, Array]) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from astropy.table import QTable
@@ -17,7 +17,7 @@ WIDTH, PANEL, MARGIN = 7.5, 1.5, 0.6
 
 def plot_light_curves(
     table: QTable,
-    path: str | os.PathLike[str] | None = None,
+    path: str | os.PathLike[str] | BinaryIO | None = None,
     *,
     names: Sequence[str] | None = None,
     title: str = "",
@@ -28,8 +28,9 @@ def plot_light_curves(
     ----------
     table : astropy.table.QTable
         What `fit_light_curves` returned.
-    path : path-like, optional
-        Where to save the picture as well; the ending says how (``.png``, ``.pdf``, ``.svg``).
+    path : path-like or binary file, optional
+        Where to save the picture as well; the ending says how (``.png``, ``.pdf``, ``.svg``),
+        a file without one gets a PNG.
     names : sequence of str, optional
         Names of the sources, in the order of the source table.
     title : str

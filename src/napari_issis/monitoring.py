@@ -181,11 +181,12 @@ class Monitoring:
         *,
         coadd: bool = True,
         overwrite: bool = False,
+        progress: Callable[[int, int], None] | None = None,
     ) -> None:
         """Write the stack as a FITS cube; see `napari_issis.fits_cube.write_cube`."""
         from .fits_cube import write_cube
 
-        write_cube(self, path, image, coadd=coadd, overwrite=overwrite)
+        write_cube(self, path, image, coadd=coadd, overwrite=overwrite, progress=progress)
 
     def show(self, viewer: Any = None, *, image: str = "counts", coadd: bool = True) -> Any:
         """Show the stack in napari, with its slider over the epochs; returns the layer."""

@@ -99,7 +99,7 @@ def import_dask() -> tuple[Any, Any]:
 
 
 def _rates(plan: Monitoring, dask: Any) -> dict[int, Any]:
-    render = dask.delayed(_rate, pure=False)
+    render = dask.delayed(rate_of, pure=False)
     rates: dict[int, Any] = {}
     for one in plan.exposures:
         if one.render not in rates:
@@ -110,15 +110,17 @@ def _rates(plan: Monitoring, dask: Any) -> dict[int, Any]:
     return rates
 
 
-def _rate(
+def rate_of(
     sources: QTable, observation: Observation, tolerance: float | None
 ) -> tuple[NDArray[np.float64], float]:
+    """Render what an exposure is drawn from: its rate, and the ripple removed from it."""
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
     warn_of_count_rates(rate, sources, observation)
     return rate, clipped
 
 
-def _exposed(rate: tuple[NDArray[np.float64], float], one: PlannedExposure) -> Exposure:
+def exposed(rate: tuple[NDArray[np.float64], float], one: PlannedExposure) -> Exposure:
+    """Draw a planned exposure from its rendered rate."""
     return expose(rate[0], one.sources, one.observation, seed=one.seed, clipped=rate[1])
 
 
@@ -127,12 +129,12 @@ def _image(
 ) -> NDArray[Any]:
     if image == "expected":
         return expected_of_rate(rate[0], one.observation)
-    return _exposed(rate, one).counts
+    return exposed(rate, one).counts
 
 
 def _write(rate: tuple[NDArray[np.float64], float], one: PlannedExposure, path: str) -> str:
     try:
-        _exposed(rate, one).write(path)
+        exposed(rate, one).write(path)
     except FileExistsError:
         # A cluster may run a task again whose worker was lost after it had written.
         read_finished(Path(path), one)
