@@ -12,6 +12,7 @@ from .exposure import Exposure, simulate
 from .exposure_goal import exposure_for
 from .filters import Filter
 from .forecast import forecast
+from .host_arcs import host_arcs
 from .image_psf import ImagePSF
 from .lens_delays import isothermal_delays
 from .lens_model import lens_images
@@ -86,6 +87,7 @@ __all__ = [
     "exposure_for",
     "fit_light_curves",
     "forecast",
+    "host_arcs",
     "isothermal_delays",
     "lens_images",
     "lensed_quasar",

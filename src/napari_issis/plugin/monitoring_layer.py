@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..monitoring_tasks import IMAGES, import_dask
 from .contrast import contrast_limits
 from .frames import Frames
+from .layer_styles import GEOMETRY
 
 if TYPE_CHECKING:
     from ..monitoring import Monitoring
@@ -67,6 +68,8 @@ def show_monitoring(
         frames,
         name=f"ISSIS monitoring, {image}",
         scale=(1.0, scale, scale),
+        # the other layers' on the sky; napari's scale bar wants one unit for all
+        units=("pixel", *GEOMETRY["units"]),
         contrast_limits=untouched,
         colormap="gray",
         multiscale=False,
