@@ -12,9 +12,14 @@ from .exposure import Exposure, simulate
 from .exposure_goal import exposure_for
 from .filters import Filter
 from .forecast import forecast
+from .host_arcs import host_arcs
 from .image_psf import ImagePSF
+from .lens_delays import isothermal_delays
 from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
+from .light_curve_fit import fit_light_curves
+from .light_curve_plot import plot_light_curves
+from .light_curves import damped_random_walk, sinusoid
 from .limits import CountRateWarning
 from .monitoring import Epoch, Monitoring, monitor
 from .observation import Observation
@@ -77,14 +82,19 @@ __all__ = [
     "TableSpectrum",
     "TelescopePSF",
     "count_rate",
+    "damped_random_walk",
     "expected_counts",
     "exposure_for",
+    "fit_light_curves",
     "forecast",
+    "host_arcs",
+    "isothermal_delays",
     "lens_images",
     "lensed_quasar",
     "lensed_quasars",
     "monitor",
     "parse_spectrum",
+    "plot_light_curves",
     "random_sources",
     "read_catalogue",
     "read_image",
@@ -93,6 +103,7 @@ __all__ = [
     "show",
     "signal_to_noise",
     "simulate",
+    "sinusoid",
     "source",
     "star_cluster",
     "write_png",
