@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from astropy.table import Table
     from napari.viewer import Viewer
 
+    from .apertures import aperture_photometry
     from .catalogue import Catalogue, read_catalogue, read_sources, write_sources
     from .fits_image import FitsImage, read_image
     from .plugin.scene import Scene
@@ -38,8 +39,9 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Reading and writing of files, loaded when first used: astropy's formats take their time.
-_FILES = {
+# Loaded when first used: astropy's formats and statistics take their time.
+_LATER = {
+    "aperture_photometry": "apertures",
     "Catalogue": "catalogue",
     "read_catalogue": "catalogue",
     "read_sources": "catalogue",
@@ -76,6 +78,7 @@ __all__ = [
     "Spectrum",
     "TableSpectrum",
     "TelescopePSF",
+    "aperture_photometry",
     "count_rate",
     "expected_counts",
     "exposure_for",
@@ -103,9 +106,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _FILES:
+    if name not in _LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_FILES[name]}", __name__), name)
+    return getattr(import_module(f".{_LATER[name]}", __name__), name)
 
 
 def show(
