@@ -137,9 +137,9 @@ def test_an_annulus_takes_away_what_the_known_sky_does_not():
         rate * 1e5 * np.pi * 25, rel=1e-4
     )
     for sky in ("mean", "median"):
-        (row,) = ni.aperture_photometry(exposure, rows=0, sky=sky, annulus=(5, 8))
+        (row,) = ni.aperture_photometry(exposure, rows=0, sky=sky, annulus=(1.4, 8), sigma_clip=None)
         level = (rate + SKY) * 1e5
-        pixels = np.pi * (40**2 - 25**2)
+        pixels = np.pi * (40**2 - 7**2)
         assert abs(row["sky"].value - level) < 5 * np.sqrt(level / pixels) * 1.25
         assert abs(row["bias_percent"]) < 1e-3
 
@@ -167,7 +167,7 @@ def test_the_scatter_is_the_error(options):
     """
     scene, one = ni.source("point", 30.3, 30.7, 3e-17), observation(background=0.02)
     rate, _ = noise_ready_rate(scene, one)
-    options = {"radius": 6.0, "annulus": (1, 1.5), **options}
+    options = {"radius": 6.0, "annulus": (1, 1.15), **options}
     pulls = []
     for seed in range(300):
         (row,) = ni.aperture_photometry(expose(rate, scene, one, seed=seed), **options)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from .plugin.scene import Scene
     from .png import write_png, write_source_png
     from .rgba import read_rgba, write_rgba
+    from .sheet import proposal_sheet
 
 __version__ = "0.1.0"
 
@@ -50,6 +51,7 @@ _LATER = {
     "read_image": "fits_image",
     "write_png": "png",
     "write_source_png": "png",
+    "proposal_sheet": "sheet",
     "read_rgba": "rgba",
     "write_rgba": "rgba",
 }
@@ -88,6 +90,7 @@ __all__ = [
     "lensed_quasars",
     "monitor",
     "parse_spectrum",
+    "proposal_sheet",
     "random_sources",
     "read_catalogue",
     "read_image",
