@@ -52,7 +52,7 @@ def reproduction_code(
         its exposure, which has to be saved beside.
     """
     body = [*_sources(sources), "observations = ["]
-    body += [f"    {_observation(one)}," for one in observations]
+    body += [f"    {_observation(one)}" for one in observations]
     body += [
         "]",
         f"exposures = [ni.simulate(sources, one, seed={int(seed)}) for one in observations]",
@@ -118,7 +118,7 @@ def _observation(observation: Observation) -> str:
     missing = unwritten(observation)
     if missing is not None:
         name = f"{observation.channel}.fits"
-        return f"ni.Exposure.read({name!r}).observation  # {missing}, is in that file"
+        return f"ni.Exposure.read({name!r}).observation,  # {missing}, is in that file"
     words = [f"channel={observation.channel!r}"]
     for field in fields(observation):
         value = getattr(observation, field.name)
@@ -126,7 +126,7 @@ def _observation(observation: Observation) -> str:
             continue
         if value is not None:
             words.append(f"{field.name}={_value(value)}")
-    return f"ni.Observation({', '.join(words)})"
+    return f"ni.Observation({', '.join(words)}),"
 
 
 def _value(value: Any) -> str:

@@ -74,7 +74,7 @@ def proposal_sheet(
     sources : astropy.table.QTable
         The source table. A column ``name`` names them on the page; else the rows do.
     observations : Observation or sequence of Observation
-        One to three set-ups of frames of the same shape. Of a single one the other channel is
+        One or two set-ups of frames of the same shape. Of a single one the other channel is
         added, see `both_channels`.
     path : path-like
         The file; its name ends in ``.html``. It is complete in itself, holds no scripts and
@@ -103,8 +103,8 @@ def proposal_sheet(
     check_target(path, SUFFIXES, overwrite=overwrite)
     seed = checked_seed(seed)
     given = [observations] if isinstance(observations, Observation) else list(observations)
-    if not 1 <= len(given) <= 3 or not all(isinstance(one, Observation) for one in given):
-        raise ValueError(f"observations is {observations!r}; give one to three Observations.")
+    if not 1 <= len(given) <= 2 or not all(isinstance(one, Observation) for one in given):
+        raise ValueError(f"observations is {observations!r}; give one or two Observations.")
     if len({one.shape for one in given}) > 1:
         shapes = ", ".join(str(one.shape) for one in given)
         raise ValueError(f"the observations' shapes are {shapes}; give frames of the same shape.")

@@ -22,6 +22,7 @@ from .photometry import ab_magnitude
 from .psf import RadialPSF, fwhm
 from .reproduction import reproduction_code, unwritten
 from .sheet_pictures import image_svg, model_svg
+from .source_counts import expected_counts
 from .source_rates import flux_pivots, sources_and_rates
 from .sources import spectrum_texts
 
@@ -70,6 +71,7 @@ th, td { padding: 0.3mm 1.2mm; text-align: right; border-bottom: 0.1mm solid #cc
 th { font-weight: bold; border-bottom: 0.2mm solid #555 }
 th.group { text-align: center }
 td:first-child, th:first-child, td.text, th.text { text-align: left }
+.numbers td, .numbers th { white-space: nowrap; padding: 0.3mm 0.8mm }
 ul { margin: 0; padding-left: 4mm }
 ul.warnings { color: #a40000 }
 pre { font: 6.6pt/1.25 "Liberation Mono", monospace; white-space: pre-wrap;
@@ -147,8 +149,10 @@ def page(
         goals=_goals(results, labels, goals, names),
         warnings=_warnings(results, labels),
         assumptions=_list(_assumptions(results, added)),
-        sources=_folded(_sources(table, observation, names), len(table), "sources"),
-        commands=_folded(f"<pre>{escape(code)}</pre>", len(table), "commands"),
+        sources=_folded(
+            _sources(table, observation, names), len(table), f"All {len(table)} sources are"
+        ),
+        commands=_folded(f"<pre>{escape(code)}</pre>", len(table), "The commands are"),
     )
 
 
@@ -243,7 +247,7 @@ def _forecast(
     shown: NDArray[np.intp],
     names: Sequence[str],
 ) -> str:
-    columns = ("counts", "S/N alone", "S/N", "flux error", "position", "confused with")
+    columns = ("counts", "S/N alone", "S/N", "flux (%)", "place (mas)", "neighbour")
     head = '<tr><th rowspan="2">source</th>'
     head += "".join(
         f'<th class="group" colspan="{len(columns)}">{escape(name)}</th>' for name in labels
@@ -255,24 +259,26 @@ def _forecast(
         for result in results:
             one = result.forecast[int(row)]
             observation = result.exposure.observation
-            _, rates = sources_and_rates(result.exposure.sources, observation)
+            counts = expected_counts(result.exposure.sources, observation)
             place = max(one["x_error"].value, one["y_error"].value) * observation.pixel_scale
             neighbour = int(one["neighbour"])
             cells += [
-                _number(rates[row] * observation.exposure),
+                f"{counts[row]:.0f}" if counts[row] < 1e6 else f"{counts[row]:.4g}",
                 _number(one["snr_alone"]),
                 _number(one["snr"]),
-                _number(100 / one["snr"] if one["snr"] > 0 else np.inf, " %"),
-                _number(1e3 * place, " mas"),
+                _number(100 / one["snr"] if one["snr"] > 0 else np.inf, digits=3),
+                _number(1e3 * place, digits=3),
                 f"{names[neighbour]} ({one['flux_correlation']:+.2f})" if neighbour >= 0 else "-",
             ]
         body.append(cells)
     legend = (
         '<p class="note">S/N: flux over its 1-sigma error, alone on the sky and in the crowd; '
-        "flux error and position (the larger of x and y): 1 sigma, in the crowd; in brackets "
-        "the correlation with the flux of the worst neighbour.</p>"
+        "flux and place (the larger of x and y): 1-sigma errors in the crowd; in brackets the "
+        "correlation with the flux of the worst neighbour.</p>"
     )
-    return f"<table><thead>{head}</thead><tbody>{_rows(body)}</tbody></table>{legend}"
+    return (
+        f'<table class="numbers"><thead>{head}</thead><tbody>{_rows(body)}</tbody></table>{legend}'
+    )
 
 
 def _goals(
@@ -391,6 +397,6 @@ def _folded(html: str, sources: int, what: str) -> str:
     if sources <= UNFOLDED:
         return html
     return (
-        f"<details><summary>All {sources} {what} are in this file: open it in a browser "
-        f"to see them.</summary>{html}</details>"
+        f"<details><summary>{what} in this file: open it in a browser to see them.</summary>"
+        f"{html}</details>"
     )

@@ -19,10 +19,11 @@ from .sources import SourceArrays
 
 Array = NDArray[np.float64]
 
-# Units of the SVG: the picture's width, that of the colour bar's strip below, and a star.
+# Units of the SVG: width of a picture, height of the strip below, radius of a star, and of many.
 WIDTH = 300.0
 STRIP = 34.0
 STAR_SIZE = 5.0
+SMALL_STAR = 2.5
 COLORMAP = "gray_r"
 # Sources beyond which none has its name written beside it.
 NAMED = 40
@@ -45,14 +46,15 @@ def model_svg(arrays: SourceArrays, names: Sequence[str], observation: Observati
     """
     zoom, height = _frame(observation)
     ny, _ = observation.shape
+    star = STAR_SIZE if len(arrays) <= NAMED else SMALL_STAR
     parts = [f'<rect width="{WIDTH:g}" height="{height:.2f}" fill="#fff"/>']
     for i, kind in enumerate(arrays.kind):
         x, y = (arrays.x[i] + 0.5) * zoom, (ny - 0.5 - arrays.y[i]) * zoom
-        reach = STAR_SIZE if kind == "point" else arrays.r_half[i] * zoom
+        reach = star if kind == "point" else arrays.r_half[i] * zoom
         if not (-reach <= x <= WIDTH + reach and -reach <= y <= height + reach):
             continue
         if kind == "point":
-            corners = STAR * STAR_SIZE * [1, -1] + [x, y]
+            corners = STAR * star * [1, -1] + [x, y]
             points = " ".join(f"{a:.2f},{b:.2f}" for a, b in corners)
             parts.append(f'<polygon points="{points}" fill="{POINT_COLOR}"/>')
         else:
@@ -74,8 +76,10 @@ def image_svg(exposure: Exposure) -> str:
     observation = exposure.observation
     _, height = _frame(observation)
     counts = exposure.counts
-    top = max(float(counts.max()), 1.0)
-    picture, _ = image_picture(counts, scale="log", limits=(0.0, top), colormap=COLORMAP)
+    # the sky is white, what is below it too
+    low = float(np.floor(exposure.background))
+    top = max(float(counts.max()), low + 1.0)
+    picture, _ = image_picture(counts, scale="log", limits=(low, top), colormap=COLORMAP)
     bar, _ = image_picture(np.arange(256.0)[None, :], colormap=COLORMAP)
     parts = [
         _embedded(picture, WIDTH, height),
@@ -85,7 +89,7 @@ def image_svg(exposure: Exposure) -> str:
         f'<rect width="{WIDTH:g}" height="9" fill="none" stroke="#000" stroke-width="0.6"/>',
     ]
     free = -10.0
-    for value, place in ticks(top):
+    for value, place in ticks(low, top):
         label = f"{value:g}"
         size = 6.0 * len(label)
         left = min(max(place * WIDTH - size / 2, 0.0), WIDTH - size)
@@ -98,18 +102,19 @@ def image_svg(exposure: Exposure) -> str:
     return _svg("".join(parts) + "</g>", height + STRIP)
 
 
-def ticks(top: float) -> list[tuple[float, float]]:
-    """Return counts to label on a colour bar from 0 to ``top``, and their places, 0 to 1.
+def ticks(low: float, top: float) -> list[tuple[float, float]]:
+    """Return counts to label on a colour bar from ``low`` to ``top``, and their places, 0 to 1.
 
     Notes
     -----
-    The place of v is log(1000 v / top + 1) / log(1001), as in `napari_issis.png.write_png`.
+    The place of v is log(1000 t + 1) / log(1001) with t = (v - low) / (top - low), as in
+    `napari_issis.png.write_png`.
     """
     decades = 10.0 ** np.arange(0, int(np.floor(np.log10(top))) + 1)
     steps = (1, 3) if decades.size > 2 else (1, 2, 5)
-    values = np.unique([0.0, *(s * d for d in decades for s in steps)])
-    values = values[values <= top]
-    places = LogStretch()(values / top)
+    values = np.unique([low, *(s * d for d in decades for s in steps)])
+    values = values[(values >= low) & (values <= top)]
+    places = LogStretch()((values - low) / (top - low))
     return [(float(v), float(p)) for v, p in zip(values, places, strict=True)]
 
 
