@@ -38,12 +38,15 @@ class SourceLayer:
         None where the user deleted it or it was not needed yet.
     source_id : ndarray of int
         Ids of the rows that the layer held when the two were last in step.
+    lost : tuple of QTable and ndarray, or None
+        The sources that went with the layer when the user deleted it, and their ids.
     """
 
     role = ""
 
     def __init__(self, layer: Any = None) -> None:
         self.layer = layer
+        self.lost: tuple[QTable, Ids] | None = None
         self.forget()
 
     def forget(self) -> None:
