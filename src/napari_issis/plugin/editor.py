@@ -502,8 +502,13 @@ class SourceEditor:
 
     def _places(self, ids: Any) -> NDArray[np.intp]:
         """Rows of the table with these ids, -1 where there is none."""
-        known = {int(value): place for place, value in enumerate(self.source_id)}
-        return np.array([known.get(int(value), -1) for value in ids], dtype=np.intp)
+        wanted = np.asarray(ids, dtype=np.int64)
+        if not self.source_id.size:
+            return np.full(wanted.shape, -1, dtype=np.intp)
+        order = np.argsort(self.source_id, kind="stable")
+        at = np.searchsorted(self.source_id, wanted, sorter=order)
+        places = order[np.minimum(at, order.size - 1)]
+        return np.where(self.source_id[places] == wanted, places, -1)
 
     def _new_ids(self, count: int) -> Ids:
         first = self._last_id + 1
