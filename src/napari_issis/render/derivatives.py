@@ -21,6 +21,7 @@ from .moving import highest_frequency, point_reach, profile_half_sizes
 from .optics import Optics, Transfer
 from .small_products import stack_product
 from .stamps import transform
+from .wide import wide_images
 from .windows import Window, overlap
 
 Array = NDArray[np.float64]
@@ -115,6 +116,10 @@ def derivatives(
     for i in np.setdiff1d(np.arange(len(sources)), points):
         one = sources.take(slice(i, i + 1))
         tapers = _tapers(one, wing, float(level[i]), shape)
+        if tapers is None:
+            window = slice(0, shape[0]), slice(0, shape[1])
+            result[i] = Derivatives(window, wide_images(optics, one, shape))
+            continue
         half = tuple(each.half for each in tapers)
         row, column = round(float(one.y[0])) - half[0], round(float(one.x[0])) - half[1]
         window = overlap(shape, row, column, (2 * half[0] + 1, 2 * half[1] + 1))
@@ -143,21 +148,19 @@ def _image_reach(optics: Optics, level: float) -> float:
 
 def _tapers(
     one: SourceArrays, wing: float, level: float, shape: tuple[int, int]
-) -> tuple[_Taper, _Taper]:
-    """Choose where a source's window ends in y and x."""
+) -> tuple[_Taper, _Taper] | None:
+    """Choose where a source's window ends in y and x; None if not within the frame."""
     if one.kind[0] == "point":
         return _Taper(wing), _Taper(wing)
-    # no further than the farthest pixel of the frame
-    far_y = max(abs(float(one.y[0])), abs(float(one.y[0]) - shape[0])) + 1
-    far_x = max(abs(float(one.x[0])), abs(float(one.x[0]) - shape[1])) + 1
     half_y, half_x = profile_half_sizes(one, level)
     if one.kind[0] == "uniform":
-        return _Taper(min(wing + half_y, far_y)), _Taper(min(wing + half_x, far_x))
-    own_y, own_x = _coarse(half_y), _coarse(half_x)
-    return (
-        _Taper(min(float(np.hypot(wing, own_y)), far_y)),
-        _Taper(min(float(np.hypot(wing, own_x)), far_x)),
-    )
+        start_y, start_x = wing + half_y, wing + half_x
+    else:
+        start_y, start_x = np.hypot(wing, _coarse(half_y)), np.hypot(wing, _coarse(half_x))
+    y, x = float(one.y[0]), float(one.x[0])
+    if start_y > max(y, shape[0] - y) or start_x > max(x, shape[1] - x):
+        return None
+    return _Taper(float(start_y)), _Taper(float(start_x))
 
 
 def _coarse(size: float) -> float:
