@@ -23,6 +23,7 @@ from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
 from .source_counts import expected_counts, signal_to_noise
+from .source_image import SourceImage, image_source
 from .sources import source
 from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 
@@ -73,6 +74,7 @@ __all__ = [
     "Observation",
     "PowerLaw",
     "Sky",
+    "SourceImage",
     "Spectrum",
     "TableSpectrum",
     "TelescopePSF",
@@ -80,6 +82,7 @@ __all__ = [
     "expected_counts",
     "exposure_for",
     "forecast",
+    "image_source",
     "lens_images",
     "lensed_quasar",
     "lensed_quasars",

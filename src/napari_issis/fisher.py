@@ -20,7 +20,7 @@ from .observation import Observation
 from .render.derivatives import Derivatives, derivatives
 from .render.optics import Optics
 from .source_rates import sources_and_rates
-from .sources import SourceArrays
+from .sources import IMAGE, SourceArrays
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     ]
     expected = rate + sky
     expected = np.maximum(expected, DARKEST * float(expected.max(initial=0.0)))
-    counts = np.where(arrays.kind == "point", 3, PARAMETERS)
+    counts = np.where(np.isin(arrays.kind, ("point", IMAGE)), 3, PARAMETERS)
     first = np.concatenate([[0], np.cumsum(counts)]).astype(int)
     information = _information(parts, rates, expected, first)
     values, flux_correlation = _invert(information, first)

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sources import SourceArrays
+from ..sources import IMAGE, SourceArrays
 from .moving import half_sizes, highest_frequency
 from .optics import Optics, Transfer
 from .stamps import transform
@@ -37,8 +37,8 @@ class Derivatives:
         The overlap.
     images : ndarray, shape (3 or 6, ny, nx)
         Image of the source at a rate of 1 cps, which is the derivative by the rate, and the
-        derivatives of that image by x and y (per pixel); for extended sources by r_half (per
-        pixel), ellipticity and pa (per degree) too.
+        derivatives of that image by x and y (per pixel); for extended sources, images excepted,
+        by r_half (per pixel), ellipticity and pa (per degree) too.
     """
 
     window: Window
@@ -109,7 +109,7 @@ def _limit(optics: Optics, one: SourceArrays) -> float:
 @lru_cache(maxsize=16)
 def _point_limit(optics: Optics) -> float:
     nothing = np.zeros(1)
-    one = SourceArrays(np.array(["point"]), *([nothing] * 7))
+    one = SourceArrays(np.array(["point"]), *([nothing] * 7), np.array([""]))
     return highest_frequency(optics, one, 1.0, TAIL / optics.point_area)
 
 
@@ -134,8 +134,13 @@ def _point_images(
     return np.stack([cos_y @ cos_x.T, cos_y @ sin_x.T, sin_y @ cos_x.T])
 
 
-def _transforms(one: SourceArrays, ky: Array, kx: Array) -> list[Array]:
-    """Transform of the profile and its derivatives by r_half, ellipticity and pa (degrees)."""
+def _transforms(one: SourceArrays, ky: Array, kx: Array) -> list[Transfer]:
+    """Transform of the profile and its derivatives by r_half, ellipticity and pa (degrees).
+
+    Of an image the size and the angle are known: the transform alone.
+    """
+    if one.kind[0] == IMAGE:
+        return [transform(one, ky, kx)]
     steps = {
         "r_half": STEP * float(one.r_half[0]),
         "ellipticity": STEP * (1 - float(one.ellipticity[0])),

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..psf import RadialPSF
-from ..sources import SourceArrays
+from ..sources import IMAGE, SourceArrays
 from .bounds import RADII, psf_envelope
 from .direct import has_sharp_edge
 from .discs import disc_half_sizes
 from .folding import fold_half, fold_rows
+from .images import image_gaussians
 from .optics import Optics
 from .profiles import sersic_value
 from .stamps import needed_limit, on_axes, transform
@@ -62,7 +63,7 @@ class MovingSource:
         self.kx = np.arange(mx + 1) / self.period[1]
         spectrum = optics.transfer(self.ky, self.kx) * rate
         if one.kind[0] != "point":
-            spectrum *= transform(one, self.ky, self.kx)
+            spectrum = spectrum * transform(one, self.ky, self.kx)
         self.spectrum = spectrum
 
     def add(self, image: Array, y: float, x: float) -> Window | None:
@@ -120,6 +121,13 @@ def half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> 
     if one.kind[0] == "uniform":
         half_y, half_x = disc_half_sizes(one)
         return int(half_y[0] + wing) + 2, int(half_x[0] + wing) + 2
+    if one.kind[0] == IMAGE:
+        lit = image_gaussians(one, np.array([rate]), share)
+        half_y, half_x = (
+            float(np.abs(p - c[0]).max(initial=0.0) + 5 * lit.major.max(initial=0.0))
+            for p, c in ((lit.y, one.y), (lit.x, one.x))
+        )
+        return int(half_y + wing) + 2, int(half_x + wing) + 2
     n, ratio = float(one.index[0]), 1 - float(one.ellipticity[0])
     r_half, pa = float(one.r_half[0]), float(np.radians(one.pa[0]))
     r = np.geomspace(1e-3, 1e4, 1200)
