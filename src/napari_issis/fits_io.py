@@ -10,6 +10,7 @@ A file holds, in this order,
 * ``OBSERVATION``, one row with the exact values of the observation, of which the header's
   cards are the readable copy;
 * ``PSF``, where an image serves as the PSF;
+* ``LIGHT1``, ``LIGHT2`` ..., the images that sources are;
 * ``FILTER1``, ``FILTER2``, where a curve of the user's serves as a filter.
 """
 
@@ -28,6 +29,7 @@ from .detector import Detector
 from .exposure import Exposure
 from .fits_header import observation_header, wcs_header
 from .fits_light_path import filter_hdus, sky_values, stored_filters, stored_sky
+from .fits_source_images import image_hdus, keep_images
 from .fits_table import open_fits, read_table, table_hdu
 from .image_psf import ImagePSF
 from .observation import Observation
@@ -121,7 +123,7 @@ def write_exposure(
 def scene_hdus(
     sources: Table, observation: Observation, seed: int, clipped: float = 0.0
 ) -> list[Any]:
-    """Make the extensions from which a scene can be told: sources, observation, seed, PSF, filters.
+    """Make the extensions from which a scene can be told: sources and their images, and all else.
 
     Raises
     ------
@@ -134,7 +136,7 @@ def scene_hdus(
         psf = observation.psf
         scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
         hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
-    return hdus + filter_hdus(observation)
+    return hdus + image_hdus(sources) + filter_hdus(observation)
 
 
 def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
@@ -159,6 +161,7 @@ def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
     row = {name: record[name][0] for name in record.colnames}
     observation = _observation(row, hdus)
     sources = read_table(hdus["SOURCES"])
+    keep_images(hdus)
     check_sources(sources)
     return sources, observation, int(row["SEED"]), float(row["CLIPPED"])
 

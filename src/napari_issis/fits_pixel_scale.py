@@ -46,7 +46,7 @@ def stated_pixel_scale(header: fits.Header) -> float | None:
 
 
 def _matrix(header: fits.Header) -> Any:
-    """Steps on the sky in arcsec of one pixel along x and along y, as columns."""
+    """Return the steps on the sky in arcsec of one pixel along x and along y, as columns."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

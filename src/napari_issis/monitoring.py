@@ -26,6 +26,7 @@ from .light_curves import LightCurve, flux_factors
 from .limits import warn_of_count_rates
 from .moved_frame import move_frame
 from .observation import Observation
+from .source_image import SourceImage, kept_images
 from .source_rates import sources_and_rates
 from .sources import FLUX_UNIT, check_sources
 
@@ -71,6 +72,8 @@ class PlannedExposure:
     seed: int
     # Exposures with the same number share a render.
     render: int
+    # Those that sources are, for workers in other processes.
+    images: tuple[SourceImage, ...] = field(default=(), repr=False)
 
     @property
     def file_name(self) -> str:
@@ -266,7 +269,7 @@ class Monitoring:
             if one.render not in rates:
                 name = f"issis-rate-{self._token}-{one.render}"
                 rates[one.render] = render(
-                    one.sources, one.observation, self.tolerance, dask_key_name=name
+                    one.sources, one.observation, self.tolerance, one.images, dask_key_name=name
                 )
         return rates
 
@@ -331,6 +334,7 @@ def monitor(
         raise ValueError(f"there are {len(steps)} dithers and {exposures} exposures; give as many.")
     times = np.array([_time(one.time) for one in whole])
     factors = flux_factors(light_curves, delays, times, len(arrays))
+    images = tuple(kept_images(sources).values())
     planned: list[PlannedExposure] = []
     renders: dict[Any, int] = {}
     for number, epoch in enumerate(whole):
@@ -347,7 +351,7 @@ def monitor(
             own = np.random.SeedSequence(seed, spawn_key=(number, k)).generate_state(1, np.uint64)
             planned.append(
                 PlannedExposure(
-                    number, k, float(times[number]), step, seen, frame, int(own[0]), render
+                    number, k, float(times[number]), step, seen, frame, int(own[0]), render, images
                 )
             )
     return Monitoring(
@@ -407,7 +411,10 @@ def _dask() -> tuple[Any, Any]:
 
 
 def _rate(
-    sources: QTable, observation: Observation, tolerance: float | None
+    sources: QTable,
+    observation: Observation,
+    tolerance: float | None,
+    images: tuple[SourceImage, ...],
 ) -> tuple[NDArray[np.float64], float]:
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
     warn_of_count_rates(rate, sources, observation)

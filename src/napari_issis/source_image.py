@@ -77,9 +77,7 @@ class SourceImage:
         except (TypeError, ValueError):
             raise ValueError("the image is no array of numbers.") from None
         if samples.ndim != 2 or samples.size == 0:
-            raise ValueError(
-                f"an image has two dimensions; this array's shape is {samples.shape}."
-            )
+            raise ValueError(f"an image has two dimensions; this array's shape is {samples.shape}.")
         if samples.size > MOST_SAMPLES:
             raise ValueError(
                 f"the image has {samples.shape[1]} x {samples.shape[0]} samples, more than "
@@ -276,7 +274,9 @@ def kept_image(text: str) -> SourceImage:
             f"{text!r} names no image; make the source with napari_issis.image_source."
         )
     if digest not in _kept and name != ARRAY:
-        _read_again(Path(name), digest)
+        found = _found(Path(name), digest)
+        if found is not None:
+            keep(found)
     if digest not in _kept:
         where = "" if name == ARRAY else f", and {name} holds no image with that digest"
         raise ValueError(
@@ -289,12 +289,29 @@ def kept_image(text: str) -> SourceImage:
 def kept_images(table: Any) -> dict[str, SourceImage]:
     """Return the images that a source table names, by their texts, in the order of the rows."""
     texts = image_texts(table)
-    found = [] if texts is None else [str(text) for text in texts if text]
-    return {text: kept_image(text) for text in dict.fromkeys(found)}
+    if texts is None:
+        return {}
+    imaged = [str(kind).strip() == IMAGE for kind in table["kind"]]
+    return {text: kept_image(text) for text in dict.fromkeys(texts[imaged].tolist())}
 
 
-def _read_again(path: Path, digest: str) -> None:
-    """Keep the image of a file that has a digest, mirrored or not, if there is one."""
+def check_in_files(table: Any) -> None:
+    """Raise a ValueError if an image of a source table cannot be read again from a file."""
+    texts = image_texts(table)
+    for text, image in kept_images(table).items():
+        name = text.rpartition("#")[0]
+        if name == ARRAY or not _found(Path(name), image.digest):
+            assert texts is not None
+            row = int(np.argmax(texts == text))
+            lies = "was an array" if name == ARRAY else f"is no longer in {name}"
+            raise ValueError(
+                f"row {row}, image: the image {lies}, and this format holds no images; "
+                "write the table, or an exposure of it, as FITS."
+            )
+
+
+def _found(path: Path, digest: str) -> SourceImage | None:
+    """Image of a file that has a digest, mirrored or not, if there is one."""
     from .fits_image import read_image
     from .fits_table import open_fits
 
@@ -303,13 +320,16 @@ def _read_again(path: Path, digest: str) -> None:
             numbers = [i for i, hdu in enumerate(hdus) if hdu.is_image and len(hdu.shape) >= 2]
         for number in numbers:
             samples = read_image(path, hdu=number).data
+            # an image that cannot be a source is not the one
+            if samples.size > MOST_SAMPLES or not np.isfinite(samples).all() or samples.sum() <= 0:
+                continue
             for one in (samples, np.fliplr(samples)):
                 light = SourceImage(one, str(path))
                 if light.digest == digest:
-                    keep(light)
-                    return
+                    return light
     except (OSError, ValueError):
-        return
+        pass
+    return None
 
 
 def _restored(array: Array, text: str) -> SourceImage:

@@ -131,7 +131,11 @@ def _render(
 ) -> Array:
     """Render with an error of at most ``allowed`` cps per pixel."""
     brightest = float(own_peak.max())
-    is_point, is_disc, imaged = sources.kind == "point", sources.kind == "uniform", is_image(sources)
+    is_point, is_disc, imaged = (
+        sources.kind == "point",
+        sources.kind == "uniform",
+        is_image(sources),
+    )
     lattice: Gaussians | None = None
     if imaged.any():
         pictures, picture_rate = sources.take(imaged), rate[imaged]
@@ -153,7 +157,8 @@ def _render(
         seen = _distances(sources.take(near), shape)
         if lattice is not None:
             far = _lattice_distances(lattice, shape)
-            rings, seen = (tuple(map(max, far, one)) for one in (rings, seen))
+            rings = max(far[0], rings[0]), max(far[1], rings[1])
+            seen = max(far[0], seen[0]), max(far[1], seen[1])
         return float(np.hypot(*rings)), seen
 
     plan = make_plan(

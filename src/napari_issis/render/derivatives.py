@@ -109,7 +109,8 @@ def _limit(optics: Optics, one: SourceArrays) -> float:
 @lru_cache(maxsize=16)
 def _point_limit(optics: Optics) -> float:
     nothing = np.zeros(1)
-    one = SourceArrays(np.array(["point"]), *([nothing] * 7), np.array([""]))
+    shape = (nothing, nothing, nothing, nothing)
+    one = SourceArrays(np.array(["point"]), nothing, nothing, nothing, *shape, np.array([""]))
     return highest_frequency(optics, one, 1.0, TAIL / optics.point_area)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from ..source_image import MARGIN, SourceImage, kept_image
+from ..source_image import SourceImage, kept_image
 from ..sources import IMAGE, SourceArrays
 from .gaussians import Gaussians, ellipse, join
 from .optics import Optics
@@ -26,6 +26,8 @@ CUT = 7.5
 FAINTEST = 1e-14
 # frequencies are rounded up to multiples of this, so that painted images are shared
 LIMIT_STEP = 0.1
+# pixels beyond which a PSF's wings do not change the noise
+PSF_REACH = 50.0
 
 
 def is_image(sources: SourceArrays) -> NDArray[np.bool_]:
@@ -52,7 +54,9 @@ def image_gaussians(sources: SourceArrays, rate: Array, allowed: float) -> Gauss
     allowed : float
         Error allowed, cps per pixel: samples are left out that are fainter than a share of it.
     """
-    return join([_one(sources.take(slice(i, i + 1)), float(rate[i]), allowed) for i in range(len(sources))])
+    return join(
+        [_one(sources.take(slice(i, i + 1)), float(rate[i]), allowed) for i in range(len(sources))]
+    )
 
 
 def _one(one: SourceArrays, rate: float, allowed: float) -> Gaussians:
@@ -166,10 +170,16 @@ def image_transform(one: SourceArrays, ky: Array, kx: Array) -> NDArray[np.compl
         Frequencies in cycles per pixel.
     """
     image, pitch = image_of(one)
+    return _transform(image, pitch, float(one.pa[0]), ky, kx)
+
+
+def _transform(
+    image: SourceImage, pitch: float, pa: float, ky: Array, kx: Array
+) -> NDArray[np.complex128]:
     ky, kx = ky * pitch, kx * pitch
     highest = max(float(np.abs(ky).max(initial=0.0)), float(np.abs(kx).max(initial=0.0)))
     limit = LIMIT_STEP * float(np.ceil(min(highest, CUTOFF) / LIMIT_STEP))
-    density, cell = _density(image, float(one.pa[0]) % 360.0, limit)
+    density, cell = _density(image, pa % 360.0, limit)
     y, x = ((np.arange(n) - 0.5 * (n - 1)) * cell for n in density.shape)
     low_y, low_x = np.abs(ky) <= CUTOFF, np.abs(kx) <= CUTOFF
     by_row = np.exp(-2j * np.pi * np.outer(ky[low_y], y))
@@ -179,9 +189,27 @@ def image_transform(one: SourceArrays, ky: Array, kx: Array) -> NDArray[np.compl
     return transform
 
 
+def inverse_noise_area(optics: Optics, one: SourceArrays) -> float:
+    """Integral of the squared modulus of the transform of an image as the detector sees it."""
+    image, pitch = image_of(one)
+    return _inverse_noise_area(optics, image, pitch, float(one.pa[0]))
+
+
+@lru_cache(maxsize=256)
+def _inverse_noise_area(optics: Optics, image: SourceImage, pitch: float, pa: float) -> float:
+    # the trapezoid rule is exact for light that ends within the period
+    period = pitch * 2 * image.half_diagonal + 2 * PSF_REACH
+    limit = min(optics.band_limit(1e-5), CUTOFF / pitch)
+    modes = int(limit * period)
+    ky, kx = np.arange(-modes, modes + 1) / period, np.arange(modes + 1) / period
+    squared = np.abs(optics.transfer(ky, kx) * _transform(image, pitch, pa, ky, kx)) ** 2
+    squared[:, 1:] *= 2
+    return float(squared.sum() / period**2)
+
+
 @lru_cache(maxsize=8)
 def _density(image: SourceImage, pa: float, limit: float) -> tuple[Array, float]:
-    """An image turned, painted on a mesh that is centred on it; light per cell, and the cell.
+    """Turn an image and paint it on a mesh centred on it; return light per cell, and the cell.
 
     Lengths are in samples.
     """

@@ -123,11 +123,11 @@ def half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> 
         return int(half_y[0] + wing) + 2, int(half_x[0] + wing) + 2
     if one.kind[0] == IMAGE:
         lit = image_gaussians(one, np.array([rate]), share)
-        half_y, half_x = (
-            float(np.abs(p - c[0]).max(initial=0.0) + 5 * lit.major.max(initial=0.0))
-            for p, c in ((lit.y, one.y), (lit.x, one.x))
-        )
-        return int(half_y + wing) + 2, int(half_x + wing) + 2
+        if not len(lit):
+            return 2, 2
+        wing += 5 * float(lit.major.max(initial=0.0))
+        far_y, far_x = (np.abs(p - c[0]).max() for p, c in ((lit.y, one.y), (lit.x, one.x)))
+        return int(far_y + wing) + 2, int(far_x + wing) + 2
     n, ratio = float(one.index[0]), 1 - float(one.ellipticity[0])
     r_half, pa = float(one.r_half[0]), float(np.radians(one.pa[0]))
     r = np.geomspace(1e-3, 1e4, 1200)
