@@ -28,6 +28,7 @@ from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
 from .source_counts import expected_counts, signal_to_noise
+from .source_image import SourceImage, image_source
 from .sources import source
 from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 
@@ -82,6 +83,7 @@ __all__ = [
     "Observation",
     "PowerLaw",
     "Sky",
+    "SourceImage",
     "Spectrum",
     "TableSpectrum",
     "TelescopePSF",
@@ -93,6 +95,7 @@ __all__ = [
     "fit_light_curves",
     "forecast",
     "host_arcs",
+    "image_source",
     "isothermal_delays",
     "lens_images",
     "lensed_quasar",

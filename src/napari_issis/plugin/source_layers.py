@@ -236,7 +236,8 @@ class PointsLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Points only."""
-        return np.asarray(kinds, dtype=np.str_) == "point"
+        held: NDArray[np.bool_] = np.asarray(kinds, dtype=np.str_) == "point"
+        return held
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Positions."""
@@ -296,7 +297,8 @@ class EllipsesLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """All but points."""
-        return np.asarray(kinds, dtype=np.str_) != "point"
+        held: NDArray[np.bool_] = np.asarray(kinds, dtype=np.str_) != "point"
+        return held
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Corners of the half-light isophotes."""
