@@ -193,7 +193,7 @@ def test_a_run_that_was_interrupted_goes_on(tmp_path, renders):
 
 def test_files_of_another_sequence_are_not_taken_for_finished(tmp_path):
     sequence().run(tmp_path)
-    with pytest.raises(ValueError, match=r"epoch0000_exposure00\.fits holds .* another sequence"):
+    with pytest.raises(ValueError, match=r"epoch\d{4}_exposure\d\d\.fits holds .* another sequence"):
         sequence(seed=8).run(tmp_path)
     (tmp_path / "epoch0001_exposure01.fits").write_bytes(b"SIMPLE")
     with pytest.raises(ValueError, match=r"epoch0001_exposure01\.fits is no finished exposure"):
