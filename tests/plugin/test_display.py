@@ -179,22 +179,23 @@ def test_magnitudes_beside_the_logarithm(scene, form):
 def test_magnitudes_are_of_the_sources_spectrum(scene, form):
     """Catches a flat spectrum's magnitudes beside sources that have another, unsaid.
 
-    By hand: of F = (wavelength / 2000 A)^-2 the photons are 2000^2 ln(b / a) / ((b^2 - a^2) / 2)
-    of those of a flat spectrum of 1 over the band from a to b.
+    By hand: of F = (wavelength / 1500 A)^-6 the photons are
+    1500^6 (a^-4 - b^-4) / 4 / ((b^2 - a^2) / 2) of those of a flat spectrum of 1 over the band
+    from a to b.
     """
     low, high = 1850.0, 3200.0
     form.scale.value = "log"
     table = scene.sources
-    table["spectrum"] = ["powerlaw(-2, at=2000)"] * 4
+    table["spectrum"] = ["powerlaw(-6, at=1500)"] * 4
     scene.sources = table
     scene.wait()
     scene.counts.set_limits((1.0, 1000.0))
     rate = (1000.0 - scene.exposure.background) / 50.0
-    photons = 2000.0**2 * np.log(high / low) / (0.5 * (high**2 - low**2))
+    photons = 1500.0**6 * (low**-4 - high**-4) / 4 / (0.5 * (high**2 - low**2))
     flux = rate / (1.14e17 * photons * 0.036**2)
-    magnitude = -2.5 * np.log10(flux * 2000.0**2 / 2.99792458e18) - 48.6
+    magnitude = -2.5 * np.log10(flux * 1500.0**2 / 2.99792458e18) - 48.6
     assert dict(form.bar.magnitude_ticks())[1.0] == f"{magnitude:.1f}"
-    assert "powerlaw(-2, at=2000)" in form.bar.toolTip()
+    assert "powerlaw(-6, at=1500)" in form.bar.toolTip()
     assert form.units.text().endswith("AB mag/″²")
     table["spectrum"][0] = "flat"
     scene.sources = table

@@ -151,13 +151,17 @@ def test_it_is_measured_in_the_background_once_and_only_in_sight(panel, scene, q
         enter(panel.psf.jitter, jitter)
     qtbot.waitUntil(lambda: not panel.psf._jobs.busy, timeout=60000)
     assert [jitter for jitter, _ in measured] == [0.061]
+    for jitter in ("0.065", "0.061"):
+        enter(panel.psf.jitter, jitter)
+        qtbot.waitUntil(lambda: not panel.psf._jobs.busy, timeout=60000)
+    assert [jitter for jitter, _ in measured] == [0.061, 0.065]
     assert panel.psf.read_out.isEnabled()
     assert all(thread is not threading.main_thread() for _, thread in measured)
     panel.hide()
     panel.pause()
     scene.observation = OWN
     assert not panel.psf._jobs.busy
-    assert len(measured) == 1
+    assert len(measured) == 2
 
 
 def test_the_psf_comes_back_from_file_and_crash(panel, scene, qtbot, tmp_path):
