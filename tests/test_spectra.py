@@ -6,6 +6,7 @@ import astropy.units as u
 import numpy as np
 import pytest
 import synphot
+from astropy.io import fits
 from astropy.table import QTable, vstack
 from scipy.integrate import quad
 from synphot.models import BlackBodyNorm1D, Empirical1D, Gaussian1D, PowerLawFlux1D
@@ -314,6 +315,9 @@ def test_exposures_keep_spectra(tmp_path):
     exposure.write(tmp_path / "e.fits")
     back = ni.Exposure.read(tmp_path / "e.fits")
     assert list(back.sources["spectrum"]) == ["blackbody(30000 K)"]
+    # the header's conversion is that of a flat spectrum, and says so
+    header = fits.getheader(tmp_path / "e.fits")
+    assert "CPSFLUX holds for a flat spectrum" in " ".join(header["COMMENT"])
     assert np.array_equal(back.counts, exposure.counts)
 
 

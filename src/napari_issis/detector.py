@@ -91,6 +91,14 @@ class Detector:
         """Return the rate that is counted of a true rate, cps per pixel, any shape."""
         return rate / (1 + rate * self.dead_time) if self.dead_time else rate
 
+    def received(self, rate: Array) -> Array:
+        """Return the true rate of which a rate is counted, cps per pixel, any shape.
+
+        Infinite from one count per dead time on.
+        """
+        seeing = 1 - rate * self.dead_time
+        return np.divide(rate, seeing, out=np.full_like(rate, np.inf), where=seeing > 0)
+
     def stored(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the numbers that the memory holds after these counts, any shape."""
         return counts % WORD if self.rollover else counts

@@ -11,7 +11,7 @@ from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .instrument import PIXEL_SCALE
-from .spectra import Spectrum, parse_spectrum
+from .spectra import FLAT, Spectrum, parse_spectrum
 
 Array = NDArray[np.float64]
 # Spectra that occur in a source table, each with its rows.
@@ -276,6 +276,22 @@ def spectra_of(table: Table) -> SpectraOfRows:
         except ValueError as error:
             raise ValueError(f"row {rows[0]}, spectrum: {error}") from None
     return found
+
+
+def shared_spectrum(table: Table) -> Spectrum | None:
+    """Return the spectrum of all sources of a table, or None if they have different ones.
+
+    Flat where there is no source, and no column ``spectrum``.
+
+    Raises
+    ------
+    ValueError
+        If a text is no spectrum.
+    """
+    texts = spectrum_texts(table)
+    distinct = [] if texts is None else list(dict.fromkeys(texts.tolist()))
+    spectra = {parse_spectrum(text) for text in distinct} or {FLAT}
+    return spectra.pop() if len(spectra) == 1 else None
 
 
 def spectrum_texts(table: Table) -> NDArray[np.str_] | None:
