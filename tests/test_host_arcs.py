@@ -43,7 +43,7 @@ def test_total_magnification_of_a_ring(n):
 
     inner = integrate.quad(lambda b: light(b, 2 * theta / b), 0, theta)[0]
     outer = integrate.quad(lambda b: light(b, 1 + theta / b), theta, 30)[0]
-    assert arcs.sum() == pytest.approx(3e-16 * (inner + outer), rel=2e-3)
+    assert arcs.sum() / 3e-16 == pytest.approx(inner + outer, rel=2e-3)
 
 
 def test_surface_brightness_is_conserved():
@@ -78,7 +78,7 @@ def test_without_a_lens_it_is_the_host_itself():
         host_ellipticity=ellipticity,
         host_pa=pa,
     )
-    assert arcs.sum() == pytest.approx(2e-16, rel=1e-5)
+    assert arcs.sum() / 2e-16 == pytest.approx(1.0, rel=1e-5)
     share, (east, north) = arcs / arcs.sum(), places(arcs)
     de, dn = east - (share * east).sum(), north - (share * north).sum()
     assert (share * east).sum() == pytest.approx(0.2, abs=1e-6)
@@ -109,7 +109,7 @@ def test_a_small_host_lies_where_the_quasar_does():
     for x, y, flux in zip(images["x"], images["y"], images["flux"].value, strict=True):
         e, n = -(x - 50) * 0.036, (y - 50) * 0.036
         near = np.hypot(east - e, north - n) < 0.15
-        assert arcs[near].sum() == pytest.approx(flux, rel=0.05)
+        assert arcs[near].sum() / flux == pytest.approx(1.0, rel=0.05)
         assert np.average(east[near], weights=arcs[near]) == pytest.approx(e, abs=0.01)
         assert np.average(north[near], weights=arcs[near]) == pytest.approx(n, abs=0.01)
 
