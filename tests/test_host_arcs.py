@@ -133,3 +133,24 @@ def test_bad_input(options, message):
     good = {"einstein_radius": 1.0, "quasar": (0.1, 0.0), "flux": 1e-16, "r_half": 0.2}
     with pytest.raises(ValueError, match=message):
         ni.host_arcs(**{**good, **options})
+
+
+def test_as_a_source_in_a_rolled_frame():
+    """Catches arcs that are mirrored or turned the wrong way when they become a source.
+
+    A small host has an arc about each image of the quasar, as bright as that image.
+    """
+    frame = ni.Observation(shape=(121, 121), exposure=100.0, roll=25.0, psf=ni.GaussianPSF(0.08))
+    lens = {"einstein_radius": 1.2, "ellipticity": 0.3, "pa": 30.0, "quasar": (0.05, 0.1)}
+    images = ni.lens_images(frame, **lens, flux=1e-15)
+    arcs = ni.host_arcs(**lens, flux=1e-15, r_half=0.01, n=0.5, width=4.5, pixel_scale=0.012)
+    host = ni.image_source(arcs, 60.0, 60.0, arcs.sum(), pixel_scale=0.012, pa=-frame.roll)
+    rate = ni.count_rate(host, frame)
+    y, x = np.indices(rate.shape)
+    for image in images:
+        at = float(image["x"]), float(image["y"])
+        near = np.hypot(x - at[0], y - at[1]) < 8
+        share = rate[near].sum() / (image["flux"].value * frame.cps_per_flux)
+        assert share == pytest.approx(1.0, rel=0.1)
+        assert np.average(x[near], weights=rate[near]) == pytest.approx(at[0], abs=0.5)
+        assert np.average(y[near], weights=rate[near]) == pytest.approx(at[1], abs=0.5)
