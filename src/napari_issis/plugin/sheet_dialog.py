@@ -45,6 +45,7 @@ class SheetDialog(QDialog):  # type: ignore[misc]
         self.title_.setToolTip("Heading of the page")
         self.notes = QPlainTextEdit()
         self.notes.setToolTip("Text below the heading")
+        self.notes.setPlaceholderText("Text below the heading")
         self.notes.setTabChangesFocus(True)
         self.notes.setFixedHeight(5 * self.fontMetrics().height())
         self.snr = QDoubleSpinBox()
