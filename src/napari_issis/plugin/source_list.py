@@ -34,6 +34,7 @@ from superqt.utils import qthrottled
 
 from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
 from ..sources import KINDS
+from .photometry_dialog import PhotometryDialog
 from .reader import tell_notes
 from .scene import open_scene
 from .source_columns import COLUMNS, from_text, to_text
@@ -94,6 +95,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             ("Delete", "Remove the selected sources (Del)", self.delete),
             ("&Import…", "Add a catalogue: ECSV, CSV, FITS, VOTable, DS9", self.load),
             ("Expor&t…", "Write the sources to a file: ECSV, CSV, FITS, VOTable", self.save),
+            ("&Photometry…", "Measure sources in apertures, beside the truth", self.photometry),
         ):
             button = QPushButton(label)
             button.setToolTip(tooltip)
@@ -115,6 +117,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             shortcut.activated.connect(action)
         self.view.selectionModel().selectionChanged.connect(self._rows_selected)
         self.model.refused.connect(self._tell_refused)
+        self._photometry: PhotometryDialog | None = None
         self._following = self._selecting = False
         self._soon = qthrottled(self.refresh, timeout=REST)
 
@@ -227,6 +230,13 @@ class SourceList(QWidget):  # type: ignore[misc]
             show_error(str(error))
         else:
             show_info(f"Saved {path}")
+
+    def photometry(self) -> None:
+        """Open the dialog of aperture photometry."""
+        if self._photometry is None:
+            self._photometry = PhotometryDialog(self.scene, self)
+        self._photometry.show()
+        self._photometry.raise_()
 
     def _select_last(self, count: int) -> None:
         self.scene.editor.select(self.scene.editor.source_id[-count:].tolist())
