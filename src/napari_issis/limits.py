@@ -78,6 +78,31 @@ def count_rate_warnings(
     return messages
 
 
+def brief_warning(
+    rate: NDArray[np.float64], background_rate: float, sources: Table, observation: Observation
+) -> str:
+    """Say in a line or two what `count_rate_warnings` says; empty if no limit is broken.
+
+    It names the source with the brightest pixel, or the rate in all where no pixel is too
+    bright, and the cure. Parameters as there.
+    """
+    if rate.size == 0:
+        return ""
+    total = float(rate.sum() + background_rate * rate.size)
+    peak = float(rate.max()) + background_rate
+    if total <= LIMITS.total and peak <= LIMITS.local:
+        return ""
+    text = f"Too bright: {total:.3g} cps in all (limit {LIMITS.total:.0e})."
+    if peak > LIMITS.local:
+        rows = bright_sources(sources, observation, rate)
+        there = f", row {rows[0]}" if rows.size else ""
+        more = f" and {rows.size - 1} more" if rows.size > 1 else ""
+        text = f"Too bright: {peak:.3g} cps/px (limit {LIMITS.local:g}){there}{more}."
+    excess = max(total / LIMITS.total, peak / LIMITS.local)
+    cure = _cure(excess, observation.filters).removeprefix("The neutral filter ")
+    return f"{text} {cure}"
+
+
 def warn_of_count_rates(
     rate: NDArray[np.float64], sources: Table, observation: Observation, *, stacklevel: int = 2
 ) -> None:

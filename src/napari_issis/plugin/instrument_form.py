@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from html import escape
 from typing import Any
 
 from magicgui.widgets import CheckBox, ComboBox, PushButton
@@ -26,6 +27,7 @@ from .scene import Scene
 # What the last entry of a wheel stands for.
 LOAD = "load"
 # Black on amber is readable in napari's dark and light themes.
+WARNING_NOTE = "The limits are those of HST ACS/SBC, the nearest analogue."
 WARNING_STYLE = "color: #111; background: #ffcf5c; padding: 3px; border-radius: 3px;"
 
 
@@ -93,7 +95,7 @@ class InstrumentForm(Form):
         self.add("Detector", self.loss, self.rollover)
         self.sky = self.add_text("Background with the filters in place, by parts")
         self.psf = PsfRows(self, scene)
-        self.warning = self.add_text("Limits of HST ACS/SBC, the nearest analogue")
+        self.warning = self.add_text(WARNING_NOTE)
         self.warning.setStyleSheet(WARNING_STYLE)
         self._shown: tuple[Any, ...] = (
             scene.observation.exposure,
@@ -185,8 +187,11 @@ class InstrumentForm(Form):
     def show_warnings(self, event: Any = None) -> None:
         """Show the count-rate limits that the present picture breaks."""
         picture = self.scene.picture
-        text = "\n".join(() if picture is None else picture.warnings)
+        text = "" if picture is None else picture.warning
         self.warning.setText(text)
+        if picture is not None:
+            lines = (*picture.warnings, WARNING_NOTE)
+            self.warning.setToolTip("".join(f"<p>{escape(line)}</p>" for line in lines))
         self.show_row(self.warning, bool(text))
 
     def _apply(self, **change: Any) -> None:

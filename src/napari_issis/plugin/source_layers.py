@@ -123,15 +123,21 @@ class SourceLayer:
             return
         mine = self.holds(table["kind"])
         part, ids = table[mine], source_id[mine]
-        selected = set(self.current_ids()[list(self.layer.selected_data)])
-        self.replace(self.geometry(part), part)
         written = features(part, ids)
-        self.layer.features = written.copy()
         mark = {"role": self.role, "flux_unit": str(table["flux"].unit)}
         self.layer.metadata = {**self.layer.metadata, MARKER: mark}
-        self.layer.selected_data = {
-            int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
-        }
+        current = self.layer.features
+        if not (
+            len(current) == len(written)
+            and current.reindex(columns=written.columns).equals(written)
+            and self.shows(part)
+        ):
+            selected = set(self.current_ids()[list(self.layer.selected_data)])
+            self.replace(self.geometry(part), part)
+            self.layer.features = written.copy()
+            self.layer.selected_data = {
+                int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
+            }
         self._note(written, ids)
 
     def in_step(self, part: QTable, source_id: Ids) -> None:
