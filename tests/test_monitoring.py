@@ -11,7 +11,7 @@ from astropy.table import vstack
 
 import napari_issis as ni
 from independent_wcs import independent_wcs
-from napari_issis import monitoring
+from napari_issis import monitoring, monitoring_tasks
 from napari_issis.sources import check_sources
 
 pytest.importorskip("dask")
@@ -30,13 +30,13 @@ def sequence(**options):
 def renders(monkeypatch):
     """Count the scenes that are rendered."""
     calls = Counter()
-    real = monitoring.noise_ready_rate
+    real = monitoring_tasks.noise_ready_rate
 
     def counted(sources, observation, **options):
         calls[monitoring._scene_key(sources, observation)] += 1
         return real(sources, observation, **options)
 
-    monkeypatch.setattr(monitoring, "noise_ready_rate", counted)
+    monkeypatch.setattr(monitoring_tasks, "noise_ready_rate", counted)
     return calls
 
 
@@ -171,12 +171,12 @@ def test_a_run_that_was_interrupted_goes_on(tmp_path, renders):
         if done:
             raise Stop
 
-    before, monitoring.BATCH = monitoring.BATCH, 1
+    before, monitoring_tasks.BATCH = monitoring_tasks.BATCH, 1
     try:
         with pytest.raises(Stop):
             sequence().run(tmp_path, progress=stop)
     finally:
-        monitoring.BATCH = before
+        monitoring_tasks.BATCH = before
     assert seen == [(0, 6), (2, 6)]
     finished = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     seen.clear()

@@ -142,6 +142,11 @@ def _simulate(words: list[str]) -> None:
         help="image that stands first in the FITS file; default: counts",
     )
     parser.add_argument("--dtype", choices=DTYPES, help="numbers of that image")
+    parser.add_argument(
+        "--image-only",
+        action="store_true",
+        help="write that image alone, as other programs expect it; not a scene to open again",
+    )
     parser.add_argument("--rgba", metavar="X.png", help="counts as red + 256 green + 65536 blue")
     parser.add_argument("--model", metavar="X.png", help="picture of the sources to write as well")
     parser.add_argument("--zoom", type=int, default=1, help="magnification of both pictures")
@@ -177,6 +182,7 @@ def _simulate(words: list[str]) -> None:
         compress=options.compress,
         image=options.image,
         dtype=options.dtype,
+        whole=not options.image_only,
     )
     print(f"wrote {options.output}")
     counts, shape = exposure.counts, observation.shape

@@ -79,6 +79,24 @@ def write_png(
     -----
     Scale, limits, colormap and zoom stand in the file as PNG text.
     """
+    picture, (low, high) = image_picture(
+        image, scale=scale, limits=limits, colormap=colormap, zoom=zoom
+    )
+    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
+    if isinstance(colormap, str):
+        text["Colormap"] = colormap
+    _save(picture, path, text | (words or {}), overwrite=overwrite)
+
+
+def image_picture(
+    image: ArrayLike,
+    *,
+    scale: str = "linear",
+    limits: tuple[float, float] | None = None,
+    colormap: str | NDArray[np.uint8] = "gray",
+    zoom: int = 1,
+) -> tuple[Image.Image, tuple[float, float]]:
+    """Return the picture that `write_png` writes, and the limits it has."""
     values = np.asarray(image, dtype=np.float64)
     if values.ndim != 2 or values.size == 0:
         raise ValueError(f"a PNG shows an image of two dimensions; this one's are {values.shape}.")
@@ -91,11 +109,7 @@ def write_png(
     brightness = np.rint(255 * _stretch(scale)(_normalised(values, low, high))).astype(np.uint8)
     magnified = np.flipud(brightness).repeat(zoom, axis=0).repeat(zoom, axis=1)
     colours = _colours(colormap) if isinstance(colormap, str) else colormap
-    picture = Image.fromarray(colours[magnified])
-    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
-    if isinstance(colormap, str):
-        text["Colormap"] = colormap
-    _save(picture, path, text | (words or {}), overwrite=overwrite)
+    return Image.fromarray(colours[magnified]), (low, high)
 
 
 def write_source_png(

@@ -14,6 +14,8 @@ from .instrument import PIXEL_SCALE
 from .spectra import Spectrum, parse_spectrum
 
 Array = NDArray[np.float64]
+# Spectra that occur in a source table, each with its rows.
+SpectraOfRows = list[tuple[Spectrum, NDArray[np.intp]]]
 
 KINDS = ("point", "uniform", "gaussian", "exponential", "devaucouleurs", "sersic")
 FLUX_UNIT = u.erg / u.s / u.cm**2 / u.AA
@@ -126,6 +128,14 @@ def source(
     return table
 
 
+def _kinds(column: Any) -> NDArray[np.str_]:
+    """Return the kinds as they are named, whatever holds them."""
+    if isinstance(column, np.ndarray) and column.dtype.kind == "U" and not hasattr(column, "mask"):
+        # 10,000 in a tenth of the time
+        return np.char.strip(np.asarray(column)).astype("U32")
+    return np.array([str(kind).strip() for kind in column], dtype="U32")
+
+
 def check_sources(
     table: Table, *, pivot: float | Array | None = None, pixel_scale: float = PIXEL_SCALE
 ) -> SourceArrays:
@@ -148,6 +158,15 @@ def check_sources(
         If a column is missing or a value out of range: the message names the row (from 0),
         the column, the value and what is allowed.
     """
+    arrays = check_columns(table, pivot=pivot, pixel_scale=pixel_scale)
+    spectra_of(table)
+    return arrays
+
+
+def check_columns(
+    table: Table, *, pivot: float | Array | None = None, pixel_scale: float = PIXEL_SCALE
+) -> SourceArrays:
+    """Do as `check_sources`, but for the column ``spectrum``, which is not looked at."""
     if not isinstance(table, Table):
         raise ValueError(f"sources is {table!r}; give a source table (astropy QTable).")
     missing = [name for name in COLUMNS[:4] if name not in table.colnames]
@@ -156,7 +175,7 @@ def check_sources(
             f"the source table has no column {', '.join(missing)}; "
             f"it needs {', '.join(COLUMNS)} (and n for Sersic profiles)."
         )
-    kind = np.array([str(k).strip() for k in table["kind"]], dtype="U32")
+    kind = _kinds(table["kind"])
     for row in np.flatnonzero(~np.isin(kind, KINDS)):
         name = str(kind[row])
         raise ValueError(f"row {row}, kind: {name!r} is unknown; known: {', '.join(KINDS)}.")
@@ -199,11 +218,10 @@ def check_sources(
         low, high = INDEX_RANGE
         _require("n", n, (n >= low) & (n <= high), sersic, f"in [{low}, {high}]")
         index[sersic] = n[sersic]
-    spectra_of(table)
     return SourceArrays(kind, x, y, flux, r_half, ellipticity, pa, index)
 
 
-def spectra_of(table: Table) -> list[tuple[Spectrum, NDArray[np.intp]]]:
+def spectra_of(table: Table) -> SpectraOfRows:
     """Spectra that occur in a source table, each with its rows; none if it has no such column.
 
     Raises

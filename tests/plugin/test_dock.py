@@ -264,9 +264,9 @@ def test_the_instrument_form_follows_scripts_only_while_shown(scene, instrument)
     assert instrument.exposure.number == 7.0
     instrument.resume()
     assert instrument.exposure.number == 8.0
-    assert "given by a script" in instrument.psf.text()
+    assert "given by a script" in instrument.psf.text.text()
     scene.observation = SMALL.replace(psf=None)
-    assert "assumed" in instrument.psf.text()
+    assert "assumed" in instrument.psf.text.text()
     instrument.pause()
 
 

@@ -25,6 +25,7 @@ from .crash_guard import CrashGuard
 from .display_form import DisplayForm
 from .instrument_form import InstrumentForm
 from .keys import show_keys
+from .missing_layers import MissingLayers
 from .panels import LIST_NAME, toggle_panel
 from .png_menu import PngMenu
 from .progress_row import ProgressRow
@@ -101,6 +102,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         layout.setContentsMargins(0, 0, 0, 4)
         self.guard = CrashGuard(self.scene)
         layout.addWidget(self.guard)
+        self.missing = MissingLayers(self.scene)
+        layout.addWidget(self.missing)
         layout.addWidget(self.pages)
         self.progress = ProgressRow(self.scene)
         layout.addWidget(self.progress)
@@ -164,6 +167,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.display.resume()
             self.view.resume()
             self.progress.resume()
+            self.missing.resume()
         super().showEvent(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -176,6 +180,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.display.pause()
             self.view.pause()
             self.progress.pause()
+            self.missing.pause()
         super().hideEvent(event)
 
 

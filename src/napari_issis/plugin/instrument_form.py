@@ -13,12 +13,14 @@ from qtpy.QtWidgets import QFileDialog
 from ..detector import Detector
 from ..filter_set import FILTER_NAMES, FILTER_NOTE, ILLUSTRATIVE_FILTERS
 from ..filters import Filter
-from ..instrument import CHANNELS, FRAME_SIZES, PIXEL_SCALE, PSF_NOTE
+from ..instrument import CHANNELS, FRAME_SIZES, PIXEL_SCALE
 from ..observation import Observation
+from ..psf_blurs import with_blurs_of
 from ..sky import SKIES
 from .form import Form
 from .number_field import NumberField, SeedField
 from .position_field import PositionField
+from .psf_rows import PsfRows
 from .scene import Scene
 
 # What the last entry of a wheel stands for.
@@ -90,7 +92,7 @@ class InstrumentForm(Form):
         )
         self.add("Detector", self.loss, self.rollover)
         self.sky = self.add_text("Background with the filters in place, by parts")
-        self.psf = self.add_text(PSF_NOTE)
+        self.psf = PsfRows(self, scene)
         self.warning = self.add_text("Limits of HST ACS/SBC, the nearest analogue")
         self.warning.setStyleSheet(WARNING_STYLE)
         self._shown: tuple[Any, ...] = (
@@ -129,6 +131,7 @@ class InstrumentForm(Form):
         """Stop following the scene."""
         self.scene.events.observation.disconnect(self.show_observation)
         self.scene.events.picture.disconnect(self.show_warnings)
+        self.psf.pause()
 
     def show_observation(self, event: Any = None) -> None:
         """Show the scene's observation and seed."""
@@ -177,11 +180,7 @@ class InstrumentForm(Form):
         if seed != self.scene.seed:
             self.seed.number = self.scene.seed
         self.sky.setText(_sky_text(observation))
-        self.psf.setText(
-            "PSF: assumed, about 0.10″ FWHM; none is published"
-            if observation.psf_assumed
-            else f"PSF: {type(observation.psf).__name__}, given by a script"
-        )
+        self.psf.show_observation()
 
     def show_warnings(self, event: Any = None) -> None:
         """Show the count-rate limits that the present picture breaks."""
@@ -191,8 +190,10 @@ class InstrumentForm(Form):
         self.show_row(self.warning, bool(text))
 
     def _apply(self, **change: Any) -> None:
+        before = self.scene.observation
         try:
-            self.scene.observation = self.scene.observation.replace(**change)
+            # blurs that were edited stay when channel or filters change the rest of the PSF
+            self.scene.observation = with_blurs_of(before.replace(**change), before)
         except ValueError as error:
             show_error(str(error))
         self.show_observation()
@@ -263,6 +264,7 @@ class InstrumentForm(Form):
         self._apply_exposure()
         self._apply_position()
         self._apply_seed()
+        self.psf.apply_typed()
 
     def _draw_noise(self, event: Any = None) -> None:
         self.scene.new_noise()

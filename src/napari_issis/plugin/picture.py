@@ -14,6 +14,7 @@ from ..drag import Drag
 from ..exposure import (
     Exposure,
     accuracy_for_counts,
+    dead_share,
     expected_of_rate,
     expose,
     noise_ready_rate,
@@ -91,15 +92,18 @@ class PictureMaker:
         moving = np.isin(source_id, held.source_id, invert=True)
         moving |= np.isin(source_id, list(held.moving))
         windows = live.move(sources[moving])
+        dead = dead_share(observation)
         if held.drawn is not None and held.drawn[0] == (observation, seed):
             _, before, counts = held.drawn
             expected = before.copy()
             for window in windows:
                 expected[window] = _expected(live.rate[window], observation)
-            counts = poisson_counts(expected, seed, previous=(before, counts), windows=windows)
+            counts = poisson_counts(
+                expected, seed, dead_share=dead, previous=(before, counts), windows=windows
+            )
         else:
             expected = _expected(live.rate, observation)
-            counts = poisson_counts(expected, seed)
+            counts = poisson_counts(expected, seed, dead_share=dead)
         # those taken over are stored already, which changes nothing a second time
         counts = observation.detector.stored(counts)
         held.drawn = ((observation, seed), expected, counts)

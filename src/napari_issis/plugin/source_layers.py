@@ -38,12 +38,15 @@ class SourceLayer:
         None where the user deleted it or it was not needed yet.
     source_id : ndarray of int
         Ids of the rows that the layer held when the two were last in step.
+    lost : tuple of QTable and ndarray, or None
+        The sources that went with the layer when the user deleted it, and their ids.
     """
 
     role = ""
 
     def __init__(self, layer: Any = None) -> None:
         self.layer = layer
+        self.lost: tuple[QTable, Ids] | None = None
         self.forget()
 
     def forget(self) -> None:
@@ -122,23 +125,26 @@ class SourceLayer:
         part, ids = table[mine], source_id[mine]
         selected = set(self.current_ids()[list(self.layer.selected_data)])
         self.replace(self.geometry(part), part)
-        self.layer.features = features(part, ids)
+        written = features(part, ids)
+        self.layer.features = written.copy()
         mark = {"role": self.role, "flux_unit": str(table["flux"].unit)}
         self.layer.metadata = {**self.layer.metadata, MARKER: mark}
         self.layer.selected_data = {
             int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
         }
-        self.in_step(part, ids)
+        self._note(written, ids)
 
     def in_step(self, part: QTable, source_id: Ids) -> None:
         """Note what the layer holds now, and the features of these rows in the layer."""
-        self.source_id = source_id
-        self._features = features(part, source_id)
-        self._geometry = self.read().copy()
+        self._note(features(part, source_id), source_id)
         table = self.layer.features
         for name in self._features.columns:
             # Setting a column in place emits nothing.
             table[name] = self._features[name].to_numpy()
+
+    def _note(self, table: pd.DataFrame, source_id: Ids) -> None:
+        self.source_id, self._features = source_id, table
+        self._geometry = self.read().copy()
 
     def shows(self, table: QTable) -> bool:
         """Whether the layer shows these rows, which are its own, as the table has them."""
@@ -230,7 +236,7 @@ class PointsLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Points only."""
-        return np.array([kind == "point" for kind in kinds], dtype=bool)
+        return np.asarray(kinds, dtype=np.str_) == "point"
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Positions."""
@@ -290,7 +296,7 @@ class EllipsesLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """All but points."""
-        return np.array([kind != "point" for kind in kinds], dtype=bool)
+        return np.asarray(kinds, dtype=np.str_) != "point"
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Corners of the half-light isophotes."""

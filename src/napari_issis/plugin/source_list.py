@@ -74,6 +74,8 @@ class SourceList(QWidget):  # type: ignore[misc]
         across, down = self.view.horizontalHeader(), self.view.verticalHeader()
         across.setSortIndicator(-1, Qt.SortOrder.AscendingOrder)
         across.setSortIndicatorClearable(True)
+        # of the list's own selection, the headings would ask Qt's flags of every cell
+        across.setSelectionModel(QItemSelectionModel(self.model, across))
         down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         down.setDefaultSectionSize(self.fontMetrics().height() + 6)
         down.setToolTip("Number of the source, from 0")
@@ -163,7 +165,8 @@ class SourceList(QWidget):  # type: ignore[misc]
 
     def selected_ids(self) -> list[int]:
         """Ids of the selected rows, from the top down."""
-        rows = sorted(index.row() for index in self.view.selectionModel().selectedRows())
+        ranges = self.view.selectionModel().selection()
+        rows = sorted({row for one in ranges for row in range(one.top(), one.bottom() + 1)})
         return self.model.ids_of(rows)
 
     def _tell_refused(self, index: QModelIndex, reason: str) -> None:

@@ -14,6 +14,8 @@ from .layer_styles import kind_color
 from .scene import Scene
 from .source_columns import COLUMNS, TEXTS, changed, exact_text, heading, shown_values, text
 
+SELECTABLE = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
+EDITABLE = SELECTABLE | Qt.ItemFlag.ItemIsEditable
 Rows = NDArray[np.intp]
 Role = Qt.ItemDataRole
 
@@ -68,7 +70,8 @@ class SourceModel(QAbstractTableModel):  # type: ignore[misc]
 
     def ids_of(self, rows: Iterable[int]) -> list[int]:
         """Ids of rows of the list."""
-        return [int(self.source_id[self.order[row]]) for row in rows]
+        chosen: list[int] = self.source_id[self.order[list(rows)]].tolist()
+        return chosen
 
     def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
         """Sort by a column; by -1, as in the source table."""
@@ -140,12 +143,9 @@ class SourceModel(QAbstractTableModel):  # type: ignore[misc]
 
     def flags(self, index: QModelIndex) -> Qt.ItemFlag:
         """Return whether a cell can be selected and edited."""
-        flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
         column = COLUMNS[index.column()]
         kind = str(self.values["kind"][self.order[index.row()]])
-        if column.editable and column.applies(kind):
-            flags |= Qt.ItemFlag.ItemIsEditable
-        return flags
+        return EDITABLE if column.editable and column.applies(kind) else SELECTABLE
 
     def setData(self, index: QModelIndex, typed: Any, role: int = Role.EditRole) -> bool:
         """Take over what was typed into a cell; ``refused`` tells why it was not."""

@@ -33,7 +33,7 @@ def master_table(table: Table) -> QTable:
         raise ValueError(str(error)) from error
     master = QTable(table, copy=True)
     extended = arrays.kind != "point"
-    width = max([13, *(len(kind) for kind in arrays.kind)])
+    width = int(np.char.str_len(arrays.kind).max(initial=13))
     master["kind"] = arrays.kind.astype(f"U{width}")
     master["x"], master["y"] = arrays.x, arrays.y
     flux = table["flux"]
