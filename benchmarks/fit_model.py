@@ -142,7 +142,7 @@ def fit(model: PixelModel, counts: Array, exposure: float, start: Array, scale: 
         return jacobian
 
     best = optimize.least_squares(
-        residual, np.zeros(start.size), slope, method="lm", xtol=1e-6, ftol=1e-9, max_nfev=200
+        residual, np.zeros(start.size), slope, method="lm", xtol=1e-4, ftol=1e-9, max_nfev=200
     )
     result: Array = start + best.x * scale
     return result

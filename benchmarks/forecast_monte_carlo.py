@@ -2,7 +2,8 @@
 
 ``python benchmarks/forecast_monte_carlo.py`` writes the figure and the table of
 ``docs/forecast.md``; ``--fits 50`` is a quick look that writes ``build/forecast.md``;
-``--again`` draws and writes what was measured last. Exposures are those of
+What was measured stays in ``build/forecast`` and is not measured again; ``--scenes quad`` measures
+those alone, so that several processes can share the work. Exposures are those of
 `napari_issis.simulate`, rendered once; what is fitted to them is the pixel model of
 ``fit_model.py``, which shares nothing with the package.
 """
@@ -13,6 +14,7 @@ import argparse
 import datetime
 import json
 import zlib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -29,6 +31,8 @@ from napari_issis.exposure import expose, noise_ready_rate
 Array = NDArray[np.float64]
 
 ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "build" / "forecast"
+SCENES = ("isolated", "pair", "quad")
 FWHM, FLUX = 0.1, 1e-17
 SNRS = (5, 10, 20, 50, 100, 300)
 SEPARATIONS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
@@ -73,18 +77,15 @@ class Outcome:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fits", type=int, default=FITS)
-    parser.add_argument("--again", action="store_true")
+    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=SCENES)
     chosen = parser.parse_args()
-    kept = ROOT / "build" / "forecast.json"
-    if not chosen.again:
-        kept.parent.mkdir(exist_ok=True)
-        measured = [asdict(one) for one in _measure(chosen.fits)]
-        kept.write_text(json.dumps({"fits": chosen.fits, "outcomes": measured}), encoding="utf-8")
-    data = json.loads(kept.read_text(encoding="utf-8"))
-    outcomes = [Outcome(**one) for one in data["outcomes"]]
-    text = _table(outcomes, data["fits"])
+    KEPT.mkdir(parents=True, exist_ok=True)
+    outcomes = _measure(chosen.scenes, chosen.fits)
+    text = _table(outcomes, chosen.fits)
     print(text)
-    whole = data["fits"] >= FITS
+    if len(chosen.scenes) < len(SCENES):
+        return
+    whole = chosen.fits >= FITS
     folder = ROOT / "docs" if whole else ROOT / "build"
     (folder / "pictures").mkdir(parents=True, exist_ok=True)
     plot(outcomes, folder / "pictures" / "forecast.png")
@@ -96,25 +97,35 @@ def main() -> None:
     page.write_text(text, encoding="utf-8")
 
 
-def _measure(fits: int) -> list[Outcome]:
-    observation = ni.Observation(shape=(31, 37), psf=ni.GaussianPSF(FWHM))
-    apart = FWHM / observation.pixel_scale
+def _measure(scenes: Sequence[str], fits: int) -> list[Outcome]:
+    small = ni.Observation(shape=(31, 37), psf=ni.GaussianPSF(FWHM))
+    large = small.replace(shape=(96, 96))
+    apart = FWHM / small.pixel_scale
     outcomes = []
-    for snr in SNRS:
-        one = ni.source("point", 18.2, 15.4, FLUX)
-        outcomes.append(_outcome("isolated", 0.0, one, observation, snr, fits))
-    for snr in SNRS[:5]:
-        for separation in SEPARATIONS:
-            x = 18.2 + separation * apart * np.array([-0.5, 0.5])
-            pair = vstack(
-                [ni.source("point", x[0], 15.1, FLUX), ni.source("point", x[1], 15.1, FLUX)]
-            )
-            outcomes.append(_outcome("pair", separation, pair, observation, snr, fits))
-    observation = observation.replace(shape=(96, 96))
-    quad = ni.lensed_quasar("Q2237+0305", observation)
-    for snr in SNRS[:5]:
-        outcomes.append(_outcome("quad", 0.0, quad, observation, snr, fits))
+    if "isolated" in scenes:
+        star = ni.source("point", 18.2, 15.4, FLUX)
+        outcomes += [_kept("isolated", 0.0, star, small, snr, fits) for snr in SNRS]
+    if "pair" in scenes:
+        for snr in SNRS[:5]:
+            for separation in SEPARATIONS:
+                x = 18.2 + separation * apart * np.array([-0.5, 0.5])
+                pair = vstack([ni.source("point", each, 15.1, FLUX) for each in x])
+                outcomes.append(_kept("pair", separation, pair, small, snr, fits))
+    if "quad" in scenes:
+        quad = ni.lensed_quasar("Q2237+0305", large)
+        outcomes += [_kept("quad", 0.0, quad, large, snr, fits) for snr in SNRS[:5]]
     return outcomes
+
+
+def _kept(
+    scene: str, separation: float, sources: QTable, where: ni.Observation, snr: float, fits: int
+) -> Outcome:
+    """Measure, unless that was done before."""
+    file = KEPT / f"{scene}-{separation:g}-{snr:g}-{fits}.json"
+    if not file.exists():
+        outcome = _outcome(scene, separation, sources, where, snr, fits)
+        file.write_text(json.dumps(asdict(outcome)), encoding="utf-8")
+    return Outcome(**json.loads(file.read_text(encoding="utf-8")))
 
 
 def _outcome(
