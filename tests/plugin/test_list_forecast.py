@@ -14,7 +14,7 @@ from small_scene import few_sources
 
 import napari_issis as ni
 from napari_issis.exposure import same_table
-from napari_issis.plugin import list_forecast
+from napari_issis.plugin import list_forecast, scene_forecast
 from napari_issis.plugin.list_forecast import FORECAST_COLUMNS
 from napari_issis.plugin.source_columns import COLUMNS, from_text
 from napari_issis.plugin.source_list import SourceList
@@ -178,9 +178,9 @@ def test_exported_and_copied(scene, listed, qtbot, tmp_path, monkeypatch, suffix
 
 def test_too_many_sources_are_named(scene, listed, qtbot, monkeypatch):
     """Catches a list that stays pending for ever or fills the memory."""
-    monkeypatch.setattr(list_forecast, "MOST", 3)
+    monkeypatch.setattr(scene_forecast, "MOST", 3)
     told = []
-    monkeypatch.setattr(list_forecast, "show_error", told.append)
+    monkeypatch.setattr(scene_forecast, "show_error", told.append)
     switch_on(listed, qtbot)
     assert cell(listed, 0, "snr_crowd") == "–"
     assert "more than 3 sources; these are 4" in told[0]

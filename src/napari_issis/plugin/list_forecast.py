@@ -1,4 +1,4 @@
-"""Forecasts of the sources of a scene for the source list, computed in the background."""
+"""The source list's columns of forecasts."""
 
 from __future__ import annotations
 
@@ -7,22 +7,15 @@ from typing import Any
 import numpy as np
 from astropy import units as u
 from astropy.table import QTable
-from napari.utils.notifications import show_error
 from numpy.typing import NDArray
-from qtpy.QtCore import QObject, QTimer, Signal
 
 from ..forecast import forecast
 from ..observation import Observation
-from .latest_wins import LatestWins
 from .scene import Scene
+from .scene_forecast import SceneForecast
 from .source_columns import Column
 
 Array = NDArray[np.float64]
-
-# Milliseconds of rest before a forecast; and during a drag none is made.
-REST = 200
-# Images of more sources and their derivatives would take more than half a GB.
-MOST = 3000
 
 FORECAST_COLUMNS = (
     Column(
@@ -83,85 +76,24 @@ def forecast_values(sources: QTable, observation: Observation) -> dict[str, Arra
     }
 
 
-class ListForecast(QObject):  # type: ignore[misc]
-    """The forecast of a live scene, newest wins; nothing is computed unless it is on.
+class ListForecast(SceneForecast):
+    """The forecast that the list of sources shows.
 
     Parameters
     ----------
     scene : Scene
         The live scene.
-
-    Attributes
-    ----------
-    changed : Signal
-        After each forecast, and when the one there is has become stale.
     """
 
-    changed = Signal()
-
     def __init__(self, scene: Scene) -> None:
-        super().__init__()
-        self.scene = scene
-        self.on = False
-        self._source_id = np.empty(0, dtype=np.int64)
-        self._values: dict[str, Array] = {}
-        self._made_for: object = None
-        self._jobs = LatestWins(self._deliver, self._failed)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(REST)
-        self._timer.timeout.connect(self._request)
-
-    @property
-    def _now(self) -> object:
-        return self.scene.editor.version, self.scene.observation
-
-    @property
-    def pending(self) -> bool:
-        """Whether a newer forecast is on its way."""
-        return self.on and self._made_for != self._now
+        super().__init__(scene, lambda *scene_now: forecast_values(*scene_now))
 
     def values(self, source_id: NDArray[np.int64]) -> dict[str, Array]:
         """Return the newest forecast for sources with these ids; NaN for others."""
-        if self.on and np.array_equal(source_id, self._source_id) and self._values:
-            return self._values
+        if self.on and self.result is not None and np.array_equal(source_id, self.source_id):
+            values: dict[str, Array] = self.result
+            return values
         return {column.name: np.full(source_id.size, np.nan) for column in FORECAST_COLUMNS}
-
-    def follow(self) -> None:
-        """Make a forecast of the scene as it is now, soon."""
-        if self.pending:
-            self._timer.start()
-
-    def pause(self) -> None:
-        """Make none any more."""
-        self._timer.stop()
-        self._jobs.cancel()
-
-    def _request(self) -> None:
-        scene = self.scene
-        if scene.editor.held is not None:
-            self._timer.start()
-            return
-        sources, observation, now = scene.sources, scene.observation, self._now
-        source_id = scene.editor.source_id.copy()
-        if len(sources) > MOST:
-            self._made_for, self._values = now, {}
-            show_error(
-                f"The list makes no forecast of more than {MOST:,} sources; these are "
-                f"{len(sources):,}. napari_issis.forecast does, in a script."
-            )
-            self.changed.emit()
-            return
-        self._jobs.request(lambda: (now, source_id, forecast_values(sources, observation)))
-
-    def _deliver(self, result: tuple[object, NDArray[np.int64], dict[str, Array]]) -> None:
-        self._made_for, self._source_id, self._values = result
-        self.changed.emit()
-
-    def _failed(self, error: BaseException) -> None:
-        self._made_for, self._values = self._now, {}
-        show_error(f"There is no forecast: {error}")
-        self.changed.emit()
 
 
 def with_forecast(sources: QTable, values: dict[str, Any] | None) -> QTable:
