@@ -138,10 +138,11 @@ def fit(model: PixelModel, counts: Array, exposure: float, start: Array, scale: 
         close = np.abs(m - counts) < 1e-4 * np.sqrt(m)
         per_mean = np.where(close, 1 / np.sqrt(m), (1 - counts / m) / np.where(close, 1.0, r))
         slopes: Array = model.slopes(start + scaled * scale) * (exposure * scale[:, None])
-        return (slopes * per_mean).T
+        jacobian: Array = (slopes * per_mean).T
+        return jacobian
 
     best = optimize.least_squares(
-        residual, np.zeros(start.size), slope, method="lm", xtol=1e-6, ftol=1e-9, max_nfev=200
+        residual, np.zeros(start.size), slope, method="lm", xtol=1e-4, ftol=1e-9, max_nfev=200
     )
     result: Array = start + best.x * scale
     return result

@@ -88,8 +88,8 @@ def test_stars_with_wide_wings(separation, ratio):
 
     With windows cut sharply, each at its own star's flux, errors were up to 98 % too small.
     """
-    shape = (81, 91)
-    stars = [(9000.0, 44.7, 40.4), (9000.0 * ratio, 44.7 + separation * PIXELS, 40.6)]
+    shape = (141, 151)
+    stars = [(9000.0, 74.7, 70.4), (9000.0 * ratio, 74.7 + separation * PIXELS, 70.6)]
     where = observation(psf=ni.MoffatPSF(FWHM, 1.5), shape=shape)
     result = ni.forecast(table(stars), where)
     found = [result["flux_error"].value * where.cps_per_flux]

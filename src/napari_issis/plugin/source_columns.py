@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -214,11 +214,13 @@ _UNITS |= {label.lower(): ("length", name) for name, label in LENGTH_LABELS.item
 _UNITS |= {"arcsec": ("length", "arcsec"), "pix": ("length", "px")}
 
 
-def to_text(values: Mapping[str, Any], rows: Any, units: Units) -> str:
+def to_text(
+    values: Mapping[str, Any], rows: Any, units: Units, columns: Sequence[Column] = COLUMNS
+) -> str:
     """Rows of the list as tab-separated text under their headings."""
-    lines = ["\t".join(heading(column, units) for column in COLUMNS)]
+    lines = ["\t".join(heading(column, units) for column in columns)]
     lines += [
-        "\t".join(exact_text(column, values[column.name][row]) for column in COLUMNS)
+        "\t".join(exact_text(column, values[column.name][row]) for column in columns)
         for row in rows
     ]
     return "\n".join(lines) + "\n"
