@@ -117,6 +117,12 @@ class SourceImage:
         reached = int(np.argmax(grown >= 0.5 * grown[-1]))
         return max(float(radius[order[reached]]), 0.5)
 
+    @property
+    def half_sizes(self) -> tuple[float, float]:
+        """Half of the image's sides (y, x), outermost pixels included, in units of `r_half`."""
+        ny, nx = self.array.shape
+        return 0.5 * ny / self.r_half, 0.5 * nx / self.r_half
+
     @cached_property
     def weights(self) -> Array:
         """Shares of the flux of the Gaussians, shape (ny + 2 MARGIN, nx + 2 MARGIN); sum 1."""
