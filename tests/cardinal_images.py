@@ -85,5 +85,8 @@ def exact_pixel(samples, pitch, x, y, pa, pixel, sigma, digits=30):
             up = pitch * (i - mp.mpf(share.shape[0] - 1) / 2)
             right = pitch * (j - mp.mpf(share.shape[1] - 1) / 2)
             at_x, at_y = x + right * cos - up * sin, y + right * sin + up * cos
+            # beyond 14 standard deviations nothing of 30 digits is left
+            if max(abs(pixel[0] - at_y), abs(pixel[1] - at_x)) > 14 * width + 1:
+                continue
             total += share[i, j] * in_pixel(pixel[0] - at_y) * in_pixel(pixel[1] - at_x)
         return float(total / share.sum())

@@ -13,7 +13,12 @@ from astropy.table import vstack
 import napari_issis as ni
 from cardinal_images import exact_pixel, image_rate
 from napari_issis.instrument import PIXEL_SCALE
-from napari_issis.source_image import kept_image
+from napari_issis.source_image import NegativeLightWarning, kept_image
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::napari_issis.CountRateWarning"),
+    pytest.mark.filterwarnings("ignore::napari_issis.source_image.NegativeLightWarning"),
+]
 
 FWHM = 0.1
 SIGMA = FWHM / np.sqrt(8 * np.log(2)) / PIXEL_SCALE
@@ -362,7 +367,7 @@ def test_text_formats_name_the_file(tmp_path):
         printed = in_a_new_process(
             "import napari_issis as ni\n"
             f"read = ni.read_sources({str(table)!r})\n"
-            "from napari_issis.source_image import kept_image\n"
+            "from napari_issis.source_image import NegativeLightWarning, kept_image\n"
             "print(repr(float(kept_image(str(read['image'][0])).array[3, 4])))"
         )
         assert float(printed) == (np.fliplr(arcs()) if mirrored else arcs())[3, 4]
@@ -449,3 +454,29 @@ def test_bad_tables():
     table["ellipticity"] = [0.0]
     with pytest.raises(ValueError, match="no column image, which row 0"):
         ni.count_rate(table)
+
+
+def test_much_negative_light_is_told():
+    samples = arcs()
+    samples[0] -= 0.1
+    share = 100 * -samples[samples < 0].sum() / samples.sum()
+    with pytest.warns(NegativeLightWarning, match=f"hold {share:.2g} % of its light") as warned:
+        placed(samples, 30, 30, 1, 0)
+    assert len(warned) == 1
+
+
+def test_scenes_without_images_pay_nothing(monkeypatch):
+    """No image is looked for, and the table has no column for it."""
+
+    def looked_for(text):
+        raise AssertionError(text)
+
+    monkeypatch.setattr("napari_issis.source_image.kept_image", looked_for)
+    monkeypatch.setattr("napari_issis.render.images.kept_image", looked_for)
+    monkeypatch.setattr("napari_issis.render.image_gaussians", looked_for)
+    table = vstack([ni.source("point", 10, 20), ni.source("sersic", 30, 30, n=2.0)])
+    exposure = ni.simulate(table, OBSERVATION)
+    assert "image" not in exposure.sources.colnames
+    ni.signal_to_noise(table, OBSERVATION)
+    ni.forecast(table, OBSERVATION)
+    ni.Drag(table, OBSERVATION, [1])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import warnings
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,14 @@ MARGIN = 64
 DIGITS = 16
 ARRAY = "array"
 
+# Negative light of an image over all its light, beyond which one is warned.
+MOST_NEGATIVE = 0.01
+
 _kept: dict[str, SourceImage] = {}
+
+
+class NegativeLightWarning(UserWarning):
+    """An image has much negative light, of which no counts can be drawn."""
 
 
 class SourceImage:
@@ -56,6 +64,11 @@ class SourceImage:
     ------
     ValueError
         If it is not a finite image of two dimensions whose sum is positive, or is too large.
+
+    Warns
+    -----
+    NegativeLightWarning
+        If negative samples hold more than 1 % of the light.
 
     Notes
     -----
@@ -95,6 +108,15 @@ class SourceImage:
             raise ValueError(
                 f"the image sums to {total}; the sum must be positive and finite. "
                 "Is its background subtracted too much?"
+            )
+        negative = float(-samples[samples < 0].sum() / total)
+        if negative > MOST_NEGATIVE:
+            warnings.warn(
+                f"negative samples of the image hold {100 * negative:.2g} % of its light; where "
+                "the expected rate is below zero no counts are drawn, and the image gets brighter "
+                "by as much. Set noise around the source to 0 to avoid that.",
+                NegativeLightWarning,
+                stacklevel=2,
             )
         samples.setflags(write=False)
         self.array = samples
