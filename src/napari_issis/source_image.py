@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import warnings
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,14 @@ MARGIN = 64
 DIGITS = 16
 ARRAY = "array"
 
+# Negative light of an image over all its light, beyond which one is warned.
+MOST_NEGATIVE = 0.01
+
 _kept: dict[str, SourceImage] = {}
+
+
+class NegativeLightWarning(UserWarning):
+    """An image has much negative light, of which no counts can be drawn."""
 
 
 class SourceImage:
@@ -56,6 +64,11 @@ class SourceImage:
     ------
     ValueError
         If it is not a finite image of two dimensions whose sum is positive, or is too large.
+
+    Warns
+    -----
+    NegativeLightWarning
+        If negative samples hold more than 1 % of the light.
 
     Notes
     -----
@@ -96,6 +109,15 @@ class SourceImage:
                 f"the image sums to {total}; the sum must be positive and finite. "
                 "Is its background subtracted too much?"
             )
+        negative = float(-samples[samples < 0].sum() / total)
+        if negative > MOST_NEGATIVE:
+            warnings.warn(
+                f"negative samples of the image hold {100 * negative:.2g} % of its light; where "
+                "the expected rate is below zero no counts are drawn, and the image gets brighter "
+                "by as much. Set noise around the source to 0 to avoid that.",
+                NegativeLightWarning,
+                stacklevel=2,
+            )
         samples.setflags(write=False)
         self.array = samples
         digest = hashlib.sha256(repr(samples.shape).encode() + samples.tobytes()).hexdigest()
@@ -116,6 +138,12 @@ class SourceImage:
         grown = np.cumsum(self.array.ravel()[order])
         reached = int(np.argmax(grown >= 0.5 * grown[-1]))
         return max(float(radius[order[reached]]), 0.5)
+
+    @property
+    def half_sizes(self) -> tuple[float, float]:
+        """Half of the image's sides (y, x), outermost pixels included, in units of `r_half`."""
+        ny, nx = self.array.shape
+        return 0.5 * ny / self.r_half, 0.5 * nx / self.r_half
 
     @cached_property
     def weights(self) -> Array:

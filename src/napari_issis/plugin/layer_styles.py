@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..instrument import PIXEL_SCALE
+from ..sources import IMAGE
 
 ELLIPSE_COLORS = {
     "uniform": "cyan",
@@ -13,6 +14,7 @@ ELLIPSE_COLORS = {
     "exponential": "yellow",
     "devaucouleurs": "orange",
     "sersic": "magenta",
+    IMAGE: "dodgerblue",
 }
 GEOMETRY: dict[str, Any] = {
     "scale": (PIXEL_SCALE, PIXEL_SCALE),
@@ -61,6 +63,11 @@ def edge_width(shape: tuple[int, int]) -> float:
 def marker_size(shape: tuple[int, int]) -> float:
     """Return the size of the markers in pixels of a frame of this shape."""
     return min(MARKER_WIDTH * max(shape) / CANVAS, WIDEST_MARKER)
+
+
+def shape_types(kinds: Iterable[str]) -> list[str]:
+    """Return how each kind is drawn: images as the rectangles that they are."""
+    return ["rectangle" if kind == IMAGE else "ellipse" for kind in kinds]
 
 
 def edge_colors(kinds: Iterable[str]) -> list[str]:

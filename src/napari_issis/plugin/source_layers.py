@@ -12,6 +12,7 @@ from napari.layers import Points, Shapes
 from numpy.typing import NDArray
 
 from ..instrument import PIXEL_SCALE
+from ..sources import IMAGE
 from . import layer_styles as styles
 from .layers import (
     FEATURES,
@@ -316,8 +317,12 @@ class EllipsesLayer(SourceLayer):
         return np.array(corners, dtype=np.float64) if len(corners) else np.empty((0, 4, 2))
 
     def foreign(self) -> list[int]:
-        """Other shapes than ellipses."""
-        return [row for row, kind in enumerate(self.layer.shape_type) if kind != "ellipse"]
+        """Other shapes than ellipses and the rectangles of images."""
+        other = [row for row, kind in enumerate(self.layer.shape_type) if kind != "ellipse"]
+        if not other or "kind" not in self.layer.features.columns:
+            return other
+        kinds = self.layer.features["kind"].to_numpy()
+        return [row for row in other if kinds[row] != IMAGE]
 
     def moved(self, table: QTable, written: Array, current: Array) -> QTable:
         """Return the table with the ellipses that changed."""
@@ -339,12 +344,16 @@ class EllipsesLayer(SourceLayer):
         )
 
     def replace(self, data: Array, table: QTable) -> None:
-        """Put ellipses into the layer."""
+        """Put ellipses and images into the layer."""
         self.layer.selected_data = set()
-        self.layer.data = [(corners, "ellipse") for corners in data]
+        self.layer.data = list(zip(data, styles.shape_types(table["kind"]), strict=True))
         if len(data):
             self.layer.edge_color = styles.edge_colors(table["kind"])
             self.layer.edge_width = [self._edge_width] * len(data)
+
+    def shows(self, table: QTable) -> bool:
+        """Tell whether the layer shows these rows, each in its shape."""
+        return super().shows(table) and self.layer.shape_type == styles.shape_types(table["kind"])
 
     def recolor(self, kinds: Iterable[str]) -> None:
         """Give each ellipse the colour of its kind."""

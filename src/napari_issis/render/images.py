@@ -179,20 +179,31 @@ def _transform(
     ky, kx = ky * pitch, kx * pitch
     highest = max(float(np.abs(ky).max(initial=0.0)), float(np.abs(kx).max(initial=0.0)))
     limit = LIMIT_STEP * float(np.ceil(min(highest, CUTOFF) / LIMIT_STEP))
-    density, cell = _density(image, pa % 360.0, limit)
+    upright = pa % 90.0 == 0.0
+    if upright:
+        # the lattice itself is a mesh
+        density, cell = np.rot90(image.weights, -round(pa / 90.0)), 1.0
+    else:
+        density, cell = _density(image, pa % 360.0, limit)
     y, x = ((np.arange(n) - 0.5 * (n - 1)) * cell for n in density.shape)
     low_y, low_x = np.abs(ky) <= CUTOFF, np.abs(kx) <= CUTOFF
     by_row = np.exp(-2j * np.pi * np.outer(ky[low_y], y))
     by_column = np.exp(-2j * np.pi * np.outer(x, kx[low_x]))
     transform = np.zeros((ky.size, kx.size), dtype=np.complex128)
     transform[np.ix_(low_y, low_x)] = (by_row @ density) @ by_column
+    if upright:
+        transform *= np.exp(-2 * (np.pi * ky) ** 2)[:, None]
+        transform *= np.exp(-2 * (np.pi * kx) ** 2)
     return transform
 
 
 def inverse_noise_area(optics: Optics, one: SourceArrays) -> float:
-    """Integral of the squared modulus of the transform of an image as the detector sees it."""
+    """Integral of the squared modulus of the transform of an image as the detector sees it.
+
+    Where the OTF is radial, of the image upright: only the square of the pixel knows its angle.
+    """
     image, pitch = image_of(one)
-    return _inverse_noise_area(optics, image, pitch, float(one.pa[0]))
+    return _inverse_noise_area(optics, image, pitch, 0.0 if optics.radial else float(one.pa[0]))
 
 
 @lru_cache(maxsize=256)
