@@ -8,7 +8,7 @@ from astropy.io import fits
 from scipy import integrate, special
 
 import napari_issis as ni
-from napari_issis.instrument import CHANNELS
+from napari_issis.instruments import ISSIS
 from napari_issis.psf import fwhm
 
 
@@ -116,7 +116,7 @@ def test_band_average_close_to_its_kinks(obscuration, ratio):
 
 
 def test_default_psfs_are_a_tenth_of_an_arcsecond():
-    for channel in CHANNELS.values():
+    for channel in ISSIS.channels.values():
         assert fwhm(channel.psf) == pytest.approx(0.10, abs=0.002)
 
 

@@ -17,12 +17,12 @@ from astropy.table import QTable
 from . import __version__
 from .catalogue import read_catalogue
 from .exposure import Exposure, simulate
-from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .fits_header import psf_description
 from .fits_io import DTYPES, IMAGES
 from .fits_io import SUFFIXES as FITS_SUFFIXES
 from .frame_coordinates import read_position
-from .instrument import CHANNELS, FILTERS
+from .instrument import Instrument
+from .instruments import INSTRUMENTS, ISSIS, instrument_named
 from .observation import Observation
 from .png import SCALES, write_png, write_source_png
 from .png import SUFFIXES as PNG_SUFFIXES
@@ -97,14 +97,21 @@ def _simulate(words: list[str]) -> None:
     parser.add_argument(
         "--scale", choices=SCALES, default="linear", help="brightness scale of the picture"
     )
-    parser.add_argument("--channel", choices=CHANNELS, help="default: the scene's, or NUV")
+    parser.add_argument(
+        "--instrument",
+        metavar="FILE",
+        help=f"camera: {', '.join(INSTRUMENTS)} or a TOML file; default: the scene's, or ISSIS",
+    )
+    parser.add_argument(
+        "--channel",
+        help=f"of ISSIS {', '.join(ISSIS.channels)}; default: the scene's, or the camera's first",
+    )
     parser.add_argument(
         "--filters",
         nargs=2,
-        choices=FILTER_NAMES,
         metavar=("WHEEL1", "WHEEL2"),
-        help=f"filter in each wheel: {', '.join(FILTERS)}, or illustrative "
-        f"{', '.join(ILLUSTRATIVE_FILTERS)}; default: the scene's, or open open",
+        help=f"filter in each wheel, of ISSIS {', '.join(ISSIS.neutral_filters)}, or illustrative "
+        f"{', '.join(ISSIS.filter_curves)}; default: the scene's, or open open",
     )
     parser.add_argument("--sky", choices=SKIES, help="default: the scene's, or CIS")
     parser.add_argument(
@@ -164,6 +171,8 @@ def _simulate(words: list[str]) -> None:
         changes["shape"] = (frame[0], frame[0]) if len(frame) == 1 else tuple(frame)
     if options.pointing is not None:
         changes["pointing"] = read_position(options.pointing)
+    if options.instrument is not None:
+        changes["instrument"] = _camera(options.instrument)
     sources, observation, notes = load_scene_with_notes(options.scene, **changes)
     if options.catalogue is not None:
         catalogue = read_catalogue(options.catalogue, observation)
@@ -185,12 +194,24 @@ def _simulate(words: list[str]) -> None:
         print(f"wrote {options.png}")
     if options.model is not None:
         write_source_png(
-            options.model, exposure.sources, shape, zoom=options.zoom, overwrite=overwrite
+            options.model,
+            exposure.sources,
+            shape,
+            zoom=options.zoom,
+            overwrite=overwrite,
+            pixel_scale=observation.pixel_scale,
         )
         print(f"wrote {options.model}")
     if options.rgba is not None:
         write_rgba(options.rgba, counts, overwrite=overwrite)
         print(f"wrote {options.rgba}")
+
+
+def _camera(name_or_path: str) -> Instrument:
+    """Return a camera by its name, or from a file."""
+    if name_or_path in INSTRUMENTS or not Path(name_or_path).exists():
+        return instrument_named(name_or_path)
+    return Instrument.read(name_or_path)
 
 
 def _list_scenes(words: list[str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable
 from itertools import combinations_with_replacement
-from math import prod
+from math import inf, prod
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from .bright_sources import bright_sources
 from .filters import Filter
-from .instrument import FILTERS, LIMITS
-from .observation import OPEN, Observation
+from .instrument import OPEN, Instrument
+from .observation import Observation
 
 # How many sources a warning names.
 NAMED = 3
@@ -44,37 +44,42 @@ def count_rate_warnings(
         The source table. With it and ``observation`` the sources that break the local limit
         are named.
     observation : Observation, optional
-        The instrument set-up. The cure allows for the filters that it has.
+        The instrument set-up, by default that of ISSIS. The cure allows for the filters that
+        it has.
 
     Notes
     -----
-    The limits are those of HST ACS/SBC, the nearest analogue (see `instrument`): none has
-    been published for ISSIS. The frame stands for the detector; light outside it is not seen.
+    The limits are the channel's. Those of ISSIS are of HST ACS/SBC, the nearest analogue: none
+    has been published. The frame stands for the detector; light outside it is not seen.
     """
     if rate.size == 0:
         return []
+    own = Observation() if observation is None else observation
+    channel = own.channel_data
+    detector = own.instrument.limits_note or f"the detector of {own.instrument.name}"
+    local_limit = channel.local_limit or inf
+    total_limit = channel.total_limit or inf
     messages = []
     total = float(rate.sum() + background_rate * rate.size)
-    if total > LIMITS.total:
+    if total > total_limit:
         messages.append(
-            f"The frame receives {total:.3g} cps; a detector such as HST's SBC is linear up to "
-            f"{LIMITS.total:.0e} cps."
+            f"The frame receives {total:.3g} cps; {detector} is linear up to {total_limit:.0e} cps."
         )
     local = rate + background_rate
     peak = float(local.max())
-    if peak > LIMITS.local:
+    if peak > local_limit:
         y, x = np.unravel_index(int(local.argmax()), local.shape)
-        count = int(np.count_nonzero(local > LIMITS.local))
+        count = int(np.count_nonzero(local > local_limit))
         pixels = "1 pixel receives" if count == 1 else f"{count} pixels receive"
         messages.append(
-            f"{pixels} more than {LIMITS.local:g} cps, at most {peak:.3g} cps at x = {x}, "
-            f"y = {y}; a detector such as HST's SBC counts linearly below that."
+            f"{pixels} more than {local_limit:g} cps, at most {peak:.3g} cps at x = {x}, "
+            f"y = {y}; {detector} counts linearly below that."
         )
         if sources is not None and observation is not None:
             messages[-1] += _names(sources, bright_sources(sources, observation, rate))
     if messages:
-        filters = OPEN if observation is None else observation.filters
-        messages[-1] += f" {_cure(max(total / LIMITS.total, peak / LIMITS.local), filters)}"
+        excess = max(total / total_limit, peak / local_limit)
+        messages[-1] += f" {_cure(excess, own.filters, own.instrument)}"
     return messages
 
 
@@ -107,24 +112,25 @@ def _pixels(value: Any) -> float:
     return float(getattr(value, "value", value))
 
 
-def _cure(excess: float, filters: tuple[str | Filter, str | Filter]) -> str:
+def _cure(excess: float, filters: tuple[str | Filter, str | Filter], instrument: Instrument) -> str:
     """Name the brightest neutral filters that bring the excess to 1 beside the curves."""
-    neutral = [one for one in filters if not isinstance(one, Filter) and one in FILTERS]
-    needed = _passed(neutral) / excess * (1 + 1e-12)
-    present = " and ".join(one for one in neutral if one != "open")
+    passed = instrument.neutral_filters
+
+    def product(names: Iterable[str]) -> float:
+        return prod(passed[name] for name in names)
+
+    neutral = [one for one in filters if not isinstance(one, Filter) and one in passed]
+    needed = product(neutral) / excess * (1 + 1e-12)
+    present = " and ".join(one for one in neutral if one != OPEN)
     instead = f" in place of {present}" if present else ""
-    names = [name for name in FILTERS if name != "open"]
+    names = [name for name in passed if name != OPEN]
     choices = [
         one for n in (1, 2)[: len(neutral)] for one in combinations_with_replacement(names, n)
     ]
     # one filter rather than two that pass as much
-    for chosen in sorted(choices, key=lambda one: (-round(_passed(one), 9), len(one))):
-        if _passed(chosen) <= needed:
+    for chosen in sorted(choices, key=lambda one: (-round(product(one), 9), len(one))):
+        if product(chosen) <= needed:
             first, *others = chosen
             text = f"{first} twice" if others == [first] else " and ".join(chosen)
             return f"The neutral filter {text}{instead} would cure it."
     return "No neutral filter cures it."
-
-
-def _passed(names: Iterable[str]) -> float:
-    return prod(FILTERS[name] for name in names)

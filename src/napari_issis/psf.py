@@ -48,10 +48,10 @@ class PSF(Protocol):
         """OTF on the grid of frequencies (fy, fx), shape (len(fy), len(fx))."""
 
 
-def positive(name: str, value: float, unit: str, *, zero: bool = False) -> float:
+def positive(name: str, value: float | None, unit: str, *, zero: bool = False) -> float:
     """Return a parameter as a float, or raise a ValueError that names it."""
     try:
-        value = float(value)
+        value = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ValueError(f"{name} is {value!r}; it must be a plain number of {unit}.") from None
     if not np.isfinite(value) or value < 0 or (value == 0 and not zero):

@@ -22,7 +22,8 @@ def exposure_layers(exposure: Exposure) -> list[LayerDataTuple]:
 
     The layers carry the mark by which a scene recognises and adopts them.
     """
-    sources, observation = master_table(exposure.sources), exposure.observation
+    observation = exposure.observation
+    sources = master_table(exposure.sources, observation.pixel_scale)
     point = np.asarray(sources["kind"], dtype=str) == "point"
     ids = np.arange(1, len(sources) + 1)
     image = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..instrument import PIXEL_SCALE
+from ..instruments import PIXEL_SCALE
 
 ELLIPSE_COLORS = {
     "uniform": "cyan",

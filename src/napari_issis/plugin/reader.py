@@ -17,7 +17,7 @@ from ..catalogue import READABLE, read_catalogue
 from ..fits_image import DistortionWarning, read_image
 from ..fits_io import SUFFIXES, read_exposure
 from ..fits_table import open_fits
-from ..instrument import PIXEL_SCALE
+from ..instruments import PIXEL_SCALE
 from ..observation import Observation
 from . import layer_styles as styles
 from .exposure_layers import adopt_layers, exposure_layers

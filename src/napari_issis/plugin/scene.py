@@ -16,7 +16,7 @@ from qtpy.QtCore import QEventLoop, QTimer
 from qtpy.QtWidgets import QApplication
 
 from ..exposure import Exposure
-from ..instrument import PIXEL_SCALE
+from ..instruments import PIXEL_SCALE
 from ..observation import Observation
 from ..source_rates import rates_per_flux
 from ..sources import source
@@ -275,7 +275,7 @@ class Scene:
 
     def _checked(self, table: Table) -> QTable:
         """Master table of sources that all have a count rate in this observation."""
-        master = master_table(table)
+        master = master_table(table, self._observation.pixel_scale)
         rates_per_flux(master, self._observation)
         return master
 
@@ -624,7 +624,9 @@ def open_scene(
     ValueError
         If the source table has an error; no window is opened then.
     """
-    table = None if sources is None else master_table(sources)
+    known = None if viewer is None else scene_of(viewer)
+    given = observation or (Observation() if known is None else known.observation)
+    table = None if sources is None else master_table(sources, given.pixel_scale)
     if viewer is None:
         viewer = Viewer(title="napari-issis")
     # Widgets get a proxy of the viewer, which must not be mistaken for another one.

@@ -11,7 +11,7 @@ from astropy.table import QTable
 from napari.layers import Points, Shapes
 from numpy.typing import NDArray
 
-from ..instrument import PIXEL_SCALE
+from ..instruments import PIXEL_SCALE
 from . import layer_styles as styles
 from .layers import (
     FEATURES,

@@ -12,7 +12,7 @@ from napari.utils.transforms import Affine
 from ..exposure import Exposure
 from ..fits_header import layer_header
 from ..fits_io import SUFFIXES, write_exposure
-from ..instrument import PIXEL_SCALE
+from ..instruments import PIXEL_SCALE
 from ..safe_write import replacing
 from .marks import MARKER
 from .scene import scene_of
