@@ -14,7 +14,7 @@ from .facts import Fact, check_numbers, number
 from .filter_set import NamedFilter, NeutralFilter
 from .filters import Filter
 from .passband import HC, Passband
-from .psf import TelescopePSF
+from .psf import WIDEST, TelescopePSF
 
 OPEN = "open"
 
@@ -84,7 +84,7 @@ class Channel:
     band: tuple[float, float] = number("Angstrom", low=10, high=1e5, count=2, rising=True)
     pixel_scale: float = number("arcsec / pix", high=100, above=True)
     detector_size: tuple[int, int] = number("pix", low=1, high=65536, count=2, whole=True)
-    diameter: float = number("m", high=1000, above=True)
+    diameter: float = number("m", high=WIDEST, above=True)
     obscuration: float = number(default=0.0, high=0.99)
     frame_sizes: tuple[int, ...] = number(
         "pix", default=(), low=1, high=16384, count=None, rising=True, whole=True
