@@ -13,6 +13,8 @@ from .exposure_goal import exposure_for
 from .filters import Filter
 from .forecast import forecast
 from .image_psf import ImagePSF
+from .instrument import Instrument
+from .instruments import INSTRUMENTS
 from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
 from .limits import CountRateWarning
@@ -53,6 +55,7 @@ _FILES = {
 }
 
 __all__ = [
+    "INSTRUMENTS",
     "SKIES",
     "BlackBody",
     "Catalogue",
@@ -67,6 +70,7 @@ __all__ = [
     "Flat",
     "GaussianPSF",
     "ImagePSF",
+    "Instrument",
     "Line",
     "MoffatPSF",
     "Monitoring",

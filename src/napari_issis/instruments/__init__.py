@@ -9,7 +9,7 @@ from ..instrument import Instrument
 from ..instrument_file import parse_instrument
 
 # File of each instrument.
-INSTRUMENTS = {"ISSIS": "issis.toml"}
+INSTRUMENTS = {"ISSIS": "issis.toml", "FCU": "fcu.toml", "ACS/SBC": "acs_sbc.toml"}
 
 
 def instrument_named(name: str) -> Instrument:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..instruments import PIXEL_SCALE
-
 ELLIPSE_COLORS = {
     "uniform": "cyan",
     "gaussian": "lightgreen",
@@ -14,8 +12,8 @@ ELLIPSE_COLORS = {
     "devaucouleurs": "orange",
     "sersic": "magenta",
 }
+# Beside the scale, which is the camera's.
 GEOMETRY: dict[str, Any] = {
-    "scale": (PIXEL_SCALE, PIXEL_SCALE),
     "units": ("arcsec", "arcsec"),
     "axis_labels": ("y", "x"),
 }

@@ -11,7 +11,6 @@ from astropy.table import QTable
 from napari.layers import Points, Shapes
 from numpy.typing import NDArray
 
-from ..instruments import PIXEL_SCALE
 from . import layer_styles as styles
 from .layers import (
     FEATURES,
@@ -49,12 +48,15 @@ class SourceLayer:
     def forget(self) -> None:
         """Forget what was written, as after the deletion of the layer."""
         self.source_id: Ids = np.empty(0, dtype=np.int64)
+        self._scale = 1.0
         self._geometry: Array = self.geometry(QTable(), empty=True)
         self._features = pd.DataFrame(columns=[*FEATURES, "source_id"])
 
-    def fit(self, shape: tuple[int, int]) -> None:
-        """Draw the marks so that they suit a frame of this shape."""
-        raise NotImplementedError
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
+        """Draw the marks so that they suit a frame of this shape and scale (arcsec per pixel)."""
+        self._scale = pixel_scale
+        if self.layer is not None:
+            self.layer.scale = (pixel_scale, pixel_scale)
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Tell which kinds of sources belong on the layer."""
@@ -221,8 +223,9 @@ class PointsLayer(SourceLayer):
     role = "points"
     _size = 9.0
 
-    def fit(self, shape: tuple[int, int]) -> None:
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
         """Give the markers a size that suits the frame."""
+        super().fit(shape, pixel_scale)
         self._size = styles.marker_size(shape)
         if self.layer is not None:
             self.layer.size = self._size
@@ -255,6 +258,7 @@ class PointsLayer(SourceLayer):
             features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
             metadata={MARKER: {"role": self.role}},
             size=self._size,
+            scale=(self._scale, self._scale),
             **styles.POINTS,
         )
 
@@ -270,8 +274,9 @@ class EllipsesLayer(SourceLayer):
     role = "ellipses"
     _widest = _edge_width = 1.0
 
-    def fit(self, shape: tuple[int, int]) -> None:
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
         """Make the edges thick enough to be seen, and no thicker, when the frame is."""
+        super().fit(shape, pixel_scale)
         self._widest = styles.edge_width(shape)
         self._set_width(self._widest)
 
@@ -280,7 +285,7 @@ class EllipsesLayer(SourceLayer):
 
         ``zoom`` is in pixels of the screen for an arcsec.
         """
-        self._set_width(min(self._widest, styles.EDGE / (zoom * PIXEL_SCALE)))
+        self._set_width(min(self._widest, styles.EDGE / (zoom * self._scale)))
 
     def _set_width(self, width: float) -> None:
         self._edge_width = width
@@ -321,6 +326,7 @@ class EllipsesLayer(SourceLayer):
             features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
             metadata={MARKER: {"role": self.role}},
             edge_width=self._edge_width,
+            scale=(self._scale, self._scale),
             **styles.ELLIPSES,
         )
 
