@@ -143,8 +143,7 @@ class InstrumentForm(Form):
                 (self.frame, _frames(observation)),
                 (self.channel, _channels(observation)),
             ):
-                with widget.changed.blocked():
-                    widget.choices = choices
+                _offer(widget, choices)
             self.psf.setToolTip(camera.psf_note)
         for widget, choices in (
             (self.camera, _cameras(observation)),
@@ -153,8 +152,7 @@ class InstrumentForm(Form):
             (self.sky_model, _skies(observation)),
         ):
             if tuple(widget.choices) != tuple(value for _, value in choices):
-                with widget.changed.blocked():
-                    widget.choices = choices
+                _offer(widget, choices)
         for widget, value in (
             (self.camera, camera),
             (self.channel, observation.channel),
@@ -309,6 +307,13 @@ def _valid(field: NumberField) -> float | None:
         return field.number
     except ValueError:
         return None
+
+
+def _offer(widget: ComboBox, choices: list[tuple[str, Any]]) -> None:
+    """Put choices into a box in this order; what it held before would stay first."""
+    with widget.changed.blocked():
+        widget.choices = ()
+        widget.choices = choices
 
 
 def _cameras(observation: Observation) -> list[tuple[str, Any]]:

@@ -40,6 +40,7 @@ class SourceLayer:
     """
 
     role = ""
+    _scale = 1.0
 
     def __init__(self, layer: Any = None) -> None:
         self.layer = layer
@@ -48,7 +49,6 @@ class SourceLayer:
     def forget(self) -> None:
         """Forget what was written, as after the deletion of the layer."""
         self.source_id: Ids = np.empty(0, dtype=np.int64)
-        self._scale = 1.0
         self._geometry: Array = self.geometry(QTable(), empty=True)
         self._features = pd.DataFrame(columns=[*FEATURES, "source_id"])
 
