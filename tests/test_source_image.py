@@ -12,7 +12,7 @@ from astropy.table import vstack
 
 import napari_issis as ni
 from cardinal_images import exact_pixel, image_rate
-from napari_issis.instrument import PIXEL_SCALE
+from napari_issis.instruments import PIXEL_SCALE
 from napari_issis.source_image import NegativeLightWarning, kept_image
 
 pytestmark = [

@@ -13,7 +13,7 @@ from synphot.models import BlackBodyNorm1D, Empirical1D, Gaussian1D, PowerLawFlu
 
 import napari_issis as ni
 from napari_issis.bright_sources import bright_sources
-from napari_issis.filter_set import ILLUSTRATIVE_FILTERS
+from napari_issis.instruments import ISSIS
 from napari_issis.source_counts import expected_counts
 from napari_issis.source_rates import cps_per_flux
 from napari_issis.spectra import BlackBody, Line, PowerLaw, TableSpectrum
@@ -28,7 +28,7 @@ def by_quadrature(shape, channel, name=None, at=None, points=()):
     """Counts of 1 erg s-1 cm-2 A-1 by adaptive quadrature, piece by piece of the filter."""
     low, high = BAND[channel]
     knots = [low, high, *points]
-    curve = ILLUSTRATIVE_FILTERS[name] if name else None
+    curve = ISSIS.filter_curves[name] if name else None
     if curve:
         knots += curve.wavelength.tolist()
     knots = np.unique([knot for knot in knots if low <= knot <= high])
@@ -101,7 +101,7 @@ def test_as_synphot_has_it(text, model, z, reddening):
     source = synphot.SourceSpectrum(
         Empirical1D, points=wave, lookup_table=flux * synphot.units.FLAM
     )
-    curve = ILLUSTRATIVE_FILTERS["N1550"]
+    curve = ISSIS.filter_curves["N1550"]
     passed = np.interp(at, curve.wavelength, curve.transmission, left=0.0, right=0.0)
     filtered = synphot.SpectralElement(Empirical1D, points=wave, lookup_table=passed)
     observed = synphot.Observation(source, filtered, binset=wave)

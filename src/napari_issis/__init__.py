@@ -14,6 +14,8 @@ from .filters import Filter
 from .forecast import forecast
 from .host_arcs import host_arcs
 from .image_psf import ImagePSF
+from .instrument import Instrument
+from .instruments import INSTRUMENTS
 from .lens_delays import isothermal_delays
 from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
@@ -63,6 +65,7 @@ _LATER = {
 }
 
 __all__ = [
+    "INSTRUMENTS",
     "SKIES",
     "BlackBody",
     "Catalogue",
@@ -77,6 +80,7 @@ __all__ = [
     "Flat",
     "GaussianPSF",
     "ImagePSF",
+    "Instrument",
     "Line",
     "MoffatPSF",
     "Monitoring",

@@ -299,7 +299,8 @@ class _Reading:
             columns = "column" if len(kept) == 1 else "columns"
             named = ", ".join(kept[:20]) + (", ..." if len(kept) > 20 else "")
             self.notes.append(f"{len(kept)} further {columns} kept: {named}")
-        check_sources(table, pivot=self.pivot)
+        scale = (self.observation or Observation()).pixel_scale
+        check_sources(table, pivot=self.pivot, pixel_scale=scale)
         return table, tuple(self.notes)
 
     @property

@@ -123,7 +123,12 @@ def _simulate(words: list[str]) -> None:
         print(f"wrote {options.png}")
     if options.model is not None:
         write_source_png(
-            options.model, exposure.sources, shape, zoom=options.zoom, overwrite=overwrite
+            options.model,
+            exposure.sources,
+            shape,
+            zoom=options.zoom,
+            overwrite=overwrite,
+            pixel_scale=observation.pixel_scale,
         )
         print(f"wrote {options.model}")
     if options.rgba is not None:

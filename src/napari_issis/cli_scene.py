@@ -5,16 +5,17 @@ from __future__ import annotations
 import argparse
 import sys
 import warnings
+from pathlib import Path
 from typing import NoReturn
 
 from astropy.table import QTable
 
 from .catalogue import read_catalogue
 from .exposure import Exposure, simulate
-from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .fits_header import psf_description
 from .frame_coordinates import read_position
-from .instrument import CHANNELS, FILTERS
+from .instrument import Instrument
+from .instruments import INSTRUMENTS, ISSIS, instrument_named
 from .observation import Observation
 from .scenes import load_scene_with_notes
 from .sky import SKIES
@@ -37,14 +38,21 @@ class Parser(argparse.ArgumentParser):
 def add_scene_options(parser: argparse.ArgumentParser) -> None:
     """Add the scene, and what can be changed in it."""
     parser.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
-    parser.add_argument("--channel", choices=CHANNELS, help="default: the scene's, or NUV")
+    parser.add_argument(
+        "--instrument",
+        metavar="FILE",
+        help=f"camera: {', '.join(INSTRUMENTS)} or a TOML file; default: the scene's, or ISSIS",
+    )
+    parser.add_argument(
+        "--channel",
+        help=f"of ISSIS {', '.join(ISSIS.channels)}; default: the scene's, or the camera's first",
+    )
     parser.add_argument(
         "--filters",
         nargs=2,
-        choices=FILTER_NAMES,
         metavar=("WHEEL1", "WHEEL2"),
-        help=f"filter in each wheel: {', '.join(FILTERS)}, or illustrative "
-        f"{', '.join(ILLUSTRATIVE_FILTERS)}; default: the scene's, or open open",
+        help=f"filter in each wheel, of ISSIS {', '.join(ISSIS.neutral_filters)}, or illustrative "
+        f"{', '.join(ISSIS.filter_curves)}; default: the scene's, or open open",
     )
     parser.add_argument("--sky", choices=SKIES, help="default: the scene's, or CIS")
     parser.add_argument(
@@ -86,6 +94,8 @@ def read_scene(options: argparse.Namespace) -> tuple[QTable, Observation]:
         changes["shape"] = (frame[0], frame[0]) if len(frame) == 1 else tuple(frame)
     if options.pointing is not None:
         changes["pointing"] = read_position(options.pointing)
+    if options.instrument is not None:
+        changes["instrument"] = _camera(options.instrument)
     sources, observation, notes = load_scene_with_notes(options.scene, **changes)
     if options.catalogue is not None:
         catalogue = read_catalogue(options.catalogue, observation)
@@ -119,3 +129,10 @@ def expose_and_tell(
     assumed = "assumed, none is published" if observation.psf_assumed else "as given"
     print(f"PSF ({assumed}): {psf_description(observation.effective_psf)}")
     return exposure
+
+
+def _camera(name_or_path: str) -> Instrument:
+    """Return a camera by its name, or from a file."""
+    if name_or_path in INSTRUMENTS or not Path(name_or_path).exists():
+        return instrument_named(name_or_path)
+    return Instrument.read(name_or_path)

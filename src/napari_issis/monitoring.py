@@ -253,7 +253,7 @@ def monitor(
         If a value is out of range; the message names it.
     """
     observation = Observation() if observation is None else observation
-    arrays = check_sources(sources, pivot=observation.pivot)
+    arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
     seed = checked_seed(seed)
     whole = tuple(one if isinstance(one, Epoch) else Epoch(_time(one)) for one in epochs)
     if not whole:
@@ -292,7 +292,7 @@ def monitor(
 
 def _scene_key(sources: QTable, observation: Observation) -> Any:
     """Return what the count rate depends on."""
-    arrays = check_sources(sources, pivot=observation.pivot)
+    arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
     values = tuple(getattr(arrays, name).tobytes() for name in arrays.__dataclass_fields__)
     return observation.replace(exposure=1.0), values
 

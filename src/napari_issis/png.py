@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
+from .instruments import PIXEL_SCALE
 from .observation import Observation
 from .safe_write import replacing
 from .source_image import kept_image
@@ -121,6 +122,7 @@ def write_source_png(
     *,
     zoom: int = 1,
     overwrite: bool = False,
+    pixel_scale: float = PIXEL_SCALE,
 ) -> None:
     """Draw a source model to a PNG file: stars, and ellipses that hold half of the light.
 
@@ -136,6 +138,8 @@ def write_source_png(
         Side of the square that each pixel of the frame becomes, 1 to 64.
     overwrite : bool
         Whether an existing file may be replaced.
+    pixel_scale : float
+        Arcsec per pixel, for radii given as angles; by default that of ISSIS.
 
     Raises
     ------
@@ -149,7 +153,7 @@ def write_source_png(
     The lines are one pixel of the file wide, on black, in the colours of `POINT_COLOR` and
     `ELLIPSE_COLORS`.
     """
-    arrays = check_sources(sources)
+    arrays = check_sources(sources, pixel_scale=pixel_scale)
     ny, nx = Observation(shape=shape).shape
     _check_zoom(zoom, (ny, nx))
     picture = Image.new("RGB", (nx * zoom, ny * zoom))

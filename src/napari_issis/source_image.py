@@ -20,7 +20,7 @@ from astropy.table import QTable
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
-from .instrument import PIXEL_SCALE
+from .instruments import PIXEL_SCALE
 from .psf import positive
 from .sources import FLUX_UNIT, IMAGE, check_sources, image_texts
 from .spectra import Spectrum

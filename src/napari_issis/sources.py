@@ -10,7 +10,7 @@ import numpy as np
 from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
-from .instrument import PIXEL_SCALE
+from .instruments import PIXEL_SCALE
 from .spectra import FLAT, Spectrum, parse_spectrum
 
 Array = NDArray[np.float64]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..instrument import PIXEL_SCALE
 from ..sources import IMAGE
 
 ELLIPSE_COLORS = {
@@ -16,8 +15,8 @@ ELLIPSE_COLORS = {
     "sersic": "magenta",
     IMAGE: "dodgerblue",
 }
+# Beside the scale, which is the camera's.
 GEOMETRY: dict[str, Any] = {
-    "scale": (PIXEL_SCALE, PIXEL_SCALE),
     "units": ("arcsec", "arcsec"),
     "axis_labels": ("y", "x"),
 }

@@ -11,7 +11,6 @@ from astropy.table import QTable
 from napari.layers import Points, Shapes
 from numpy.typing import NDArray
 
-from ..instrument import PIXEL_SCALE
 from ..sources import IMAGE
 from . import layer_styles as styles
 from .layers import (
@@ -44,6 +43,7 @@ class SourceLayer:
     """
 
     role = ""
+    _scale = 1.0
 
     def __init__(self, layer: Any = None) -> None:
         self.layer = layer
@@ -56,9 +56,11 @@ class SourceLayer:
         self._geometry: Array = self.geometry(QTable(), empty=True)
         self._features = pd.DataFrame(columns=[*FEATURES, "source_id"])
 
-    def fit(self, shape: tuple[int, int]) -> None:
-        """Draw the marks so that they suit a frame of this shape."""
-        raise NotImplementedError
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
+        """Draw the marks so that they suit a frame of this shape and scale (arcsec per pixel)."""
+        self._scale = pixel_scale
+        if self.layer is not None:
+            self.layer.scale = (pixel_scale, pixel_scale)
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Tell which kinds of sources belong on the layer."""
@@ -234,8 +236,9 @@ class PointsLayer(SourceLayer):
     role = "points"
     _size = 9.0
 
-    def fit(self, shape: tuple[int, int]) -> None:
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
         """Give the markers a size that suits the frame."""
+        super().fit(shape, pixel_scale)
         self._size = styles.marker_size(shape)
         if self.layer is not None:
             self.layer.size = self._size
@@ -269,6 +272,7 @@ class PointsLayer(SourceLayer):
             features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
             metadata={MARKER: {"role": self.role}},
             size=self._size,
+            scale=(self._scale, self._scale),
             **styles.POINTS,
         )
 
@@ -284,8 +288,9 @@ class EllipsesLayer(SourceLayer):
     role = "ellipses"
     _widest = _edge_width = 1.0
 
-    def fit(self, shape: tuple[int, int]) -> None:
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
         """Make the edges thick enough to be seen, and no thicker, when the frame is."""
+        super().fit(shape, pixel_scale)
         self._widest = styles.edge_width(shape)
         self._set_width(self._widest)
 
@@ -294,7 +299,7 @@ class EllipsesLayer(SourceLayer):
 
         ``zoom`` is in pixels of the screen for an arcsec.
         """
-        self._set_width(min(self._widest, styles.EDGE / (zoom * PIXEL_SCALE)))
+        self._set_width(min(self._widest, styles.EDGE / (zoom * self._scale)))
 
     def _set_width(self, width: float) -> None:
         self._edge_width = width
@@ -340,6 +345,7 @@ class EllipsesLayer(SourceLayer):
             features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
             metadata={MARKER: {"role": self.role}},
             edge_width=self._edge_width,
+            scale=(self._scale, self._scale),
             **styles.ELLIPSES,
         )
 

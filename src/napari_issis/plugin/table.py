@@ -9,6 +9,7 @@ from astropy import units as u
 from astropy.table import QTable, Table, vstack
 from numpy.typing import NDArray
 
+from ..instruments import PIXEL_SCALE
 from ..sources import FLUX_UNIT, IMAGE, check_sources, image_texts, spectrum_texts
 
 # Columns of text that a table may lack, and what a source then has.
@@ -16,12 +17,19 @@ TEXTS = {"spectrum": "flat", IMAGE: ""}
 STRUCTURE_UNITS = {"r_half": u.pix, "ellipticity": None, "pa": u.deg}
 
 
-def master_table(table: Table) -> QTable:
+def master_table(table: Table, pixel_scale: float = PIXEL_SCALE) -> QTable:
     """Return a checked copy of a source table that can be edited cell by cell.
 
     Positions, radii and angles become float64 in pixels and degrees; the flux keeps its unit
     (AB magnitudes included). Columns of the structure that a table of points lacks are
     filled with NaN. Further columns are kept.
+
+    Parameters
+    ----------
+    table : astropy.table.Table
+        A source table.
+    pixel_scale : float
+        Arcsec per pixel, for radii given as angles.
 
     Raises
     ------
@@ -29,7 +37,7 @@ def master_table(table: Table) -> QTable:
         If the table is not a source table; the message names row, column and value.
     """
     try:
-        arrays = check_sources(table)
+        arrays = check_sources(table, pixel_scale=pixel_scale)
     except ImportError as error:
         # of a library for spectra: in the GUI an error like any other of the table
         raise ValueError(str(error)) from error
