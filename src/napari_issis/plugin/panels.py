@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import Qt, QTimer
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QWidget
 
 from .canvas_geometry import find_window
@@ -39,8 +40,15 @@ def toggle_panel(viewer: Any, name: str, make: Callable[[Any], QWidget], area: s
     widget = make(viewer)
     viewer.window.add_dock_widget(widget, name=name, area=area)
     window = find_window(widget)
+
+    def stack() -> None:
+        # the window may have been closed meanwhile
+        with suppress(RuntimeError):
+            stack_at_bottom(window)
+
     if window is not None:
-        stack_at_bottom(window)
+        # Docks cannot be moved while they are being shown.
+        QTimer.singleShot(0, stack)
 
 
 def stack_at_bottom(window: QMainWindow) -> None:
