@@ -8,12 +8,8 @@ so that functions of the library itself are called; where they are missing it pr
 from __future__ import annotations
 
 import ctypes
-import os
 import sys
-import warnings
 from pathlib import Path
-
-warnings.simplefilter("ignore")
 
 import napari
 from PyQt6 import sip
@@ -87,11 +83,11 @@ class Hand:
         QTest.qWait(20)
 
     def write(self, pressed, place) -> None:
-        inside, on_screen = (sip.unwrapinstance(point) for point in (places := self.where(place)))
+        points = self.where(place)
+        inside, on_screen = (sip.unwrapinstance(point) for point in points)
         device = sip.unwrapinstance(self.stylus)
         self.pen_(self.window, device, inside, on_screen, pressed, pressed / 2, 0, 0, 0, 0, 0, 0)
         QTest.qWait(20)
-        del places
 
     def drag_finger(self, *places) -> None:
         self.touch(State.Pressed, places[0])
@@ -136,5 +132,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    os.environ["NAPARI_CONFIG"] = ""
     main()
