@@ -122,7 +122,11 @@ def test_closed_in_the_middle_of_a_render(make_napari_viewer, monkeypatch, qtbot
     qtbot.waitUntil(lambda: not scene._jobs.busy, timeout=5000)
     # pytest-qt fails the test for an error in a slot
     QTest.qWait(100)
-    qtbot.waitUntil(lambda: not [t for t in threading.enumerate() if "issis" in t.name])
+    # that of the autosave ends as well
+    jobs = [thread for thread in threading.enumerate() if "issis" in thread.name]
+    for job in jobs:
+        job.join(60)
+        assert not job.is_alive()
     if what == "widget":
         assert scene.settled
         assert scene.exposure == simulate(few_sources(), SMALL, seed=1)

@@ -47,7 +47,7 @@ def toggle_panel(viewer: Any, name: str, make: Callable[[Any], QWidget], area: s
             stack_at_bottom(window)
 
     if window is not None:
-        # Docks cannot be moved while they are being shown.
+        # napari shows it a little later
         QTimer.singleShot(0, stack)
 
 
@@ -64,7 +64,10 @@ def stack_at_bottom(window: QMainWindow) -> None:
                 found[name] = dock
     heights = {ROW_NAME: ROW_HEIGHT, LIST_NAME: LIST_HEIGHT}
     if len(found) == 2 and not window.tabifiedDockWidgets(found[ROW_NAME]):
+        # one that is being shown just now is not moved unless it is taken out first
+        window.removeDockWidget(found[LIST_NAME])
         window.splitDockWidget(found[ROW_NAME], found[LIST_NAME], Qt.Orientation.Vertical)
+        found[LIST_NAME].show()
     window.resizeDocks(
         list(found.values()), [heights[name] for name in found], Qt.Orientation.Vertical
     )
