@@ -158,6 +158,7 @@ def user(scene, mouse, qtbot, tmp_path, monkeypatch):
     listed.hide()
 
 
+@pytest.mark.slow
 def test_fifty_steps_of_every_kind(user, scene):
     """Catches an edit that is no step or two, and a way back that ends elsewhere."""
     history = scene.editor.history

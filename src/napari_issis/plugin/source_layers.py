@@ -242,7 +242,8 @@ class PointsLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Points only."""
-        return np.asarray(kinds, dtype=np.str_) == "point"
+        mine: NDArray[np.bool_] = np.asarray(kinds, dtype=np.str_) == "point"
+        return mine
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Positions."""
@@ -302,7 +303,8 @@ class EllipsesLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """All but points."""
-        return np.asarray(kinds, dtype=np.str_) != "point"
+        mine: NDArray[np.bool_] = np.asarray(kinds, dtype=np.str_) != "point"
+        return mine
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Corners of the half-light isophotes."""
