@@ -76,7 +76,9 @@ class PsfRows:
             form.add("Halo (1, ″)", self.share, self.width),
             form.add("", self.own),
         ]
-        form.add_native(QLabel("Light in ⌀"), self.read_out)
+        name = QLabel("Light in ⌀")
+        name.setToolTip(self.read_out.toolTip())
+        form.add_native(name, self.read_out)
         self._rows.append(self.read_out)
         self._shown: PSF | None = None
         self._jobs = LatestWins(self._show_table, self._failed)
