@@ -107,7 +107,7 @@ class PsfRows:
         psf = observation.effective_psf
         self.own.enabled = not observation.psf_assumed
         for field, name in zip(self._fields, BLURS, strict=True):
-            field.enabled = blurs is not None
+            field.enabled = blurs is not None and isinstance(psf, TelescopePSF)
             # what is being typed, or has to be corrected, stays unless the PSF changed
             if isinstance(psf, TelescopePSF) and psf != self._shown:
                 field.number = getattr(psf, name)
