@@ -210,6 +210,15 @@ def test_filters_and_spectra_count():
     np.testing.assert_allclose(table["truth"].value[:2], [4e-14, 9e-14])
 
 
+def test_another_camera():
+    """Catches templates with the pixels of ISSIS: its stars would be wider or narrower."""
+    frame = ni.Observation(instrument="ACS/SBC", shape=(40, 40), exposure=1000.0)
+    stars = vstack([ni.source("point", x, 18.0, 2e-16) for x in (14.0, 19.5)])
+    table = ni.fit_light_curves(ni.monitor(stars, frame, [0.0] * 60, seed=8))
+    found = ((table["flux"] - table["truth"]) / table["error"]).value.reshape(60, 2)
+    assert np.all(np.abs(found.mean(axis=0)) < 5.5 / np.sqrt(60))
+
+
 def test_an_image_is_a_source_like_the_others():
     """Catches an image taken for another one, whose template is kept under the same name."""
     y, x = np.indices((21, 21)) - 10.0

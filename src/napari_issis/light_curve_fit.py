@@ -174,7 +174,13 @@ def _simulator(monitoring: Monitoring) -> Callable[[int], NDArray[np.int64]]:
 def _templates(one: PlannedExposure, arrays: SourceArrays, kept: dict[Hashable, Array]) -> Array:
     """Share of the light of each source in each pixel, shape (sources, pixels)."""
     names = (name for name in arrays.__dataclass_fields__ if name != "flux")
-    frame = Observation(shape=one.observation.shape, psf=one.observation.effective_psf)
+    seen = one.observation
+    frame = Observation(
+        channel=seen.channel,
+        shape=seen.shape,
+        psf=seen.effective_psf,
+        instrument=seen.instrument,
+    )
     key = (frame, *(getattr(arrays, name).tobytes() for name in names))
     if key not in kept:
         if len(kept) >= KEPT:

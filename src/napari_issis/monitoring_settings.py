@@ -64,7 +64,10 @@ class MonitoringSettings:
         ValueError
             If a value is out of range, or there are other delays than point sources.
         """
-        points = np.flatnonzero(check_sources(sources, pivot=observation.pivot).kind == "point")
+        arrays = check_sources(
+            sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale
+        )
+        points = np.flatnonzero(arrays.kind == "point")
         if self.delays and len(self.delays) != len(points):
             raise ValueError(
                 f"there are {len(self.delays)} delays and {len(points)} point sources; give as "
