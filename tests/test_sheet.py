@@ -194,6 +194,23 @@ def test_what_cannot_be_written_is_read_from_the_saved_exposure(tmp_path, monkey
     assert np.array_equal(made["exposures"][0].counts, exposure.counts)
 
 
+def test_a_source_that_is_an_image_is_read_from_the_saved_exposure(tmp_path, monkeypatch):
+    """Catches a page that cannot be made, and commands that lose the image."""
+    y, x = np.mgrid[-9:10, -9:10]
+    arc = ni.image_source(
+        np.exp(-((np.hypot(x, y) - 5) ** 2)), 30, 22, flux=2e-16, pixel_scale=0.036
+    )
+    scene = vstack([SCENE, arc])
+    monkeypatch.chdir(tmp_path)
+    page = sheet(tmp_path / "x.html", scene)
+    assert "NUV.fits" in " ".join(page.texts)
+    exposure = ni.simulate(scene, ONE)
+    exposure.write("NUV.fits")
+    made = {}
+    exec(compile(page.code, "<sheet>", "exec"), made)
+    assert np.array_equal(made["exposures"][0].counts, exposure.counts)
+
+
 def test_the_same_input_gives_the_same_bytes(tmp_path):
     for name in ("a.html", "b.html"):
         sheet(tmp_path / name, seed=2)
