@@ -152,6 +152,7 @@ SET_UPS = {
         psf=ni.MoffatPSF(0.11, 3.1),
         sky=ni.SKIES["HST high"],
     ),
+    "camera": ni.Observation(instrument="ACS/SBC", shape=(48, 64), exposure=500.0),
     "background": ONE.replace(background=0.0123, psf=ni.GaussianPSF(0.08)),
 }
 
@@ -163,6 +164,7 @@ SET_UPS = {
         ("everything", STRANGE),
         ("curve", SCENE),
         ("background", SCENE),
+        ("camera", SCENE),
         ("plain", SCENE[:0]),
     ],
 )
