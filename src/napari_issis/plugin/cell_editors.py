@@ -15,6 +15,7 @@ class CellEditors(QStyledItemDelegate):  # type: ignore[misc]
     def createEditor(
         self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
     ) -> QWidget:
+        """Make a list of the kinds, or a field."""
         if ALL_COLUMNS[index.column()].name != "kind":
             return super().createEditor(parent, option, index)
         box = QComboBox(parent)
@@ -22,12 +23,14 @@ class CellEditors(QStyledItemDelegate):  # type: ignore[misc]
         return box
 
     def setEditorData(self, editor: QWidget, index: QModelIndex) -> None:
+        """Show what the cell holds."""
         if isinstance(editor, QComboBox):
             editor.setCurrentText(index.data(Qt.ItemDataRole.EditRole))
         else:
             super().setEditorData(editor, index)
 
     def setModelData(self, editor: QWidget, model: QAbstractItemModel, index: QModelIndex) -> None:
+        """Take over what was chosen or typed."""
         if isinstance(editor, QComboBox):
             model.setData(index, editor.currentText())
         else:
