@@ -1,8 +1,10 @@
 """How long our own code holds the GUI thread at a time, for each thing that a user does.
 
-Run it by ``xvfb-run -s "-screen 0 1366x768x24" python benchmarks/gui_thread.py [SIDE SOURCES [ACTION...]]``.
+Run it by ``xvfb-run -s "-screen 0 1366x768x24" python benchmarks/gui_thread.py``, with the
+frame's side, the number of sources and names of actions behind it if you like.
 For each action: the longest that one event or one call spent in our plugin and in what it calls,
-less what napari and vispy do in between; in milliseconds of the thread's own time. The profiler that tells these apart makes Python code about a half slower.
+less what napari and vispy do in between; in milliseconds of the thread's own time. The profiler
+that tells these apart makes Python code about a half slower.
 """
 
 from __future__ import annotations
@@ -19,11 +21,11 @@ os.environ["NAPARI_CONFIG"] = ""
 
 import napari
 import numpy as np
-from live_drag import mouse_move_callbacks, mouse_press_callbacks, mouse_release_callbacks, send
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QApplication
 
 import napari_issis as ni
+from live_drag import mouse_move_callbacks, mouse_press_callbacks, mouse_release_callbacks, send
 from napari_issis.plugin.dock import SimulatorWidget
 from napari_issis.plugin.scene import Scene, open_scene
 from napari_issis.plugin.source_list import SourceList

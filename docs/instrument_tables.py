@@ -8,12 +8,13 @@ from pathlib import Path
 
 import napari_issis as ni
 from napari_issis.encircled_energy import encircled_energy
-from napari_issis.filter_set import ILLUSTRATIVE_FILTERS
-from napari_issis.instrument import CHANNELS, DIAMETER, FILTERS, LIMITS, OBSCURATION, PIXEL_SCALE
+from napari_issis.instruments import ISSIS
 from napari_issis.psf import fwhm
 from napari_issis.sky import SKIES, paper_estimate
 from napari_issis.sky_tables import EARTHSHINE, LINES, ZODIACAL
 
+CHANNELS, FILTERS, ILLUSTRATIVE_FILTERS = ISSIS.channels, ISSIS.neutral_filters, ISSIS.filter_curves
+NUV = CHANNELS["NUV"]
 PAGE = Path(__file__).with_name("instrument.md")
 Rows = list[list[str]]
 CIRCLES = (0.1, 0.2, 0.5, 1.0)
@@ -34,7 +35,7 @@ def channels() -> Rows:
             [f"{_magnitude(name):.2f}" for name in CHANNELS],
             "derived",
         ),
-        ("pixel (arcsec)", [f"{PIXEL_SCALE}"] * 2, "paper"),
+        ("pixel (arcsec)", [f"{NUV.pixel_scale}"] * 2, "paper"),
     ):
         rows.append([label, *values, status])
     return rows
@@ -129,11 +130,11 @@ def detector() -> Rows:
     """Limits of a photon-counting detector."""
     return [
         ["quantity", "value", "status"],
-        ["local count-rate limit (cps per pixel)", f"{LIMITS.local:g}", "HST ACS/SBC"],
-        ["global count-rate limit (cps)", f"{LIMITS.total:g}", "HST ACS/SBC"],
-        ["dark rate (cps per pixel)", f"{ni.Observation().dark:g}", "paper"],
-        ["clear aperture (m)", f"{DIAMETER:g}", "published"],
-        ["linear obscuration", f"{OBSCURATION:g}", "assumed"],
+        ["local count-rate limit (cps per pixel)", f"{NUV.local_limit:g}", "HST ACS/SBC"],
+        ["global count-rate limit (cps)", f"{NUV.total_limit:g}", "HST ACS/SBC"],
+        ["dark rate (cps per pixel)", f"{ni.Observation().dark_rate:g}", "paper"],
+        ["clear aperture (m)", f"{NUV.diameter:g}", "published"],
+        ["linear obscuration", f"{NUV.obscuration:g}", "assumed"],
     ]
 
 
@@ -149,11 +150,11 @@ TABLES: dict[str, Callable[[], Rows]] = {
 }
 
 
-def filled(page: str) -> str:
+def filled(page: str, tables: dict[str, Callable[[], Rows]] = TABLES) -> str:
     """Return the page with all its tables made anew."""
 
     def table(match: re.Match[str]) -> str:
-        head, *body = TABLES[match[1]]()
+        head, *body = tables[match[1]]()
         text = [head, ["---"] * len(head), *body]
         made = "\n".join(f"| {' | '.join(row)} |" for row in text)
         return f"<!-- table: {match[1]} -->\n{made}\n<!-- end -->"

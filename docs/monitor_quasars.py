@@ -69,6 +69,12 @@ def plan_of(number: int, options: argparse.Namespace) -> ni.Monitoring:
     )
 
 
+def title_of(number: int, options: argparse.Namespace) -> str:
+    """Return what stands above the plot of a system."""
+    name = system_of(number).name
+    return f"{name}: {options.exposures} x {options.seconds:g} s every {CADENCE:g} days"
+
+
 def folder_of(number: int, options: argparse.Namespace) -> Path:
     """Return the folder of a system."""
     return Path(options.folder) / f"{number:02d}-{system_of(number).name}"
@@ -96,8 +102,9 @@ def recover(number: int, options: argparse.Namespace) -> QTable:
     folder, system = folder_of(number, options), system_of(number)
     table = ni.fit_light_curves(plan_of(number, options), folder)
     names = [*system.images, "lens galaxy"]
-    title = f"{system.name}: {options.exposures} x {options.seconds:g} s each {CADENCE:g} days"
-    ni.plot_light_curves(table, folder / "light_curves.png", names=names, title=title)
+    ni.plot_light_curves(
+        table, folder / "light_curves.png", names=names, title=title_of(number, options)
+    )
     # Written last and whole: whoever sees it finds the system finished.
     part = folder / "light_curves.part"
     table.write(part, format="ascii.ecsv", overwrite=True)
@@ -130,8 +137,8 @@ def summary(options: argparse.Namespace) -> str:
     )
 
 
-def main(words: list[str] | None = None) -> None:
-    """Run the command."""
+def arguments(words: list[str] | None = None) -> argparse.Namespace:
+    """Read the command's arguments."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", help="where the files go")
     parser.add_argument("--systems", type=int, default=41, help="default: 41")
@@ -141,7 +148,12 @@ def main(words: list[str] | None = None) -> None:
     parser.add_argument("--frame", type=int, default=128, help="pixels a side; default: 128")
     parser.add_argument("--workers", type=int, default=2, help="processes here; default: 2")
     parser.add_argument("--scheduler", help="address of a running dask.distributed cluster")
-    options = parser.parse_args(words)
+    return parser.parse_args(words)
+
+
+def main(words: list[str] | None = None) -> None:
+    """Run the command."""
+    options = arguments(words)
     warnings.simplefilter("ignore", ni.CountRateWarning)
     start = time.perf_counter()
     with connected(options) as client:

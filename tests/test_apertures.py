@@ -137,7 +137,9 @@ def test_an_annulus_takes_away_what_the_known_sky_does_not():
         rate * 1e5 * np.pi * 25, rel=1e-4
     )
     for sky in ("mean", "median"):
-        (row,) = ni.aperture_photometry(exposure, rows=0, sky=sky, annulus=(1.4, 8), sigma_clip=None)
+        (row,) = ni.aperture_photometry(
+            exposure, rows=0, sky=sky, annulus=(1.4, 8), sigma_clip=None
+        )
         level = (rate + SKY) * 1e5
         pixels = np.pi * (40**2 - 7**2)
         assert abs(row["sky"].value - level) < 5 * np.sqrt(level / pixels) * 1.25

@@ -10,7 +10,7 @@ from astropy.table import QTable, Table
 from scipy.integrate import quad
 
 import napari_issis as ni
-from napari_issis.filter_set import ILLUSTRATIVE_FILTERS
+from napari_issis.instruments import ISSIS
 
 BAND = {"FUV": (1150.0, 1750.0), "NUV": (1850.0, 3200.0)}
 RATIO = {"FUV": 3.36e15, "NUV": 1.14e17}
@@ -171,11 +171,11 @@ def test_the_papers_sky_behind_a_curve():
     assert parts["geocorona"] == pytest.approx((4.9e-3 - 7.2e-12) * passed, rel=1e-10, abs=0)
 
 
-@pytest.mark.parametrize("name", ILLUSTRATIVE_FILTERS)
+@pytest.mark.parametrize("name", ISSIS.filter_curves)
 def test_illustrative_filters_work_by_name(name):
     channel = "NUV" if name in ("N2500", "LP2600") else "FUV"
     named = ni.Observation(channel, (name, "open"))
-    given = ni.Observation(channel, ("open", ILLUSTRATIVE_FILTERS[name]))
+    given = ni.Observation(channel, ("open", ISSIS.filter_curves[name]))
     assert 0 < named.transmittance < 1
     assert named.transmittance == given.transmittance
     assert named.filter_names == (name, "open")
@@ -183,13 +183,13 @@ def test_illustrative_filters_work_by_name(name):
     assert low <= named.pivot <= high
     wavelength = float(name.lstrip("NLP"))
     assert (
-        abs(ILLUSTRATIVE_FILTERS[name](wavelength) - (0.4 if "LP" in name else named_peak(name)))
+        abs(ISSIS.filter_curves[name](wavelength) - (0.4 if "LP" in name else named_peak(name)))
         < 0.01
     )
 
 
 def named_peak(name):
-    return ILLUSTRATIVE_FILTERS[name].transmission.max()
+    return ISSIS.filter_curves[name].transmission.max()
 
 
 def test_curves_render_and_neutral_filters_do_not():

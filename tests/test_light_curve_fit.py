@@ -210,6 +210,25 @@ def test_filters_and_spectra_count():
     np.testing.assert_allclose(table["truth"].value[:2], [4e-14, 9e-14])
 
 
+def test_an_image_is_a_source_like_the_others():
+    """Catches an image taken for another one, whose template is kept under the same name."""
+    y, x = np.indices((21, 21)) - 10.0
+    blobs = [np.exp(-(x**2 + (y * q) ** 2) / 18) for q in (1.0, 2.5)]
+    for blob in blobs:
+        scene = vstack(
+            [
+                ni.source("point", 20.0, 9.0, 3e-16),
+                ni.image_source(blob, 14.0, 15.0, 2e-15, pixel_scale=SCALE),
+            ]
+        )
+        table = ni.fit_light_curves(ni.monitor(scene, FRAME, [0.0] * 60, seed=6))
+        found = ((table["flux"] - table["truth"]) / table["error"]).value.reshape(60, 2)
+        assert np.all(np.abs(found.mean(axis=0)) < 5.5 / np.sqrt(60))
+        low, high = stats.chi2.ppf([FALSE_ALARM / 2, 1 - FALSE_ALARM / 2], 60)
+        total = (found**2).sum(axis=0)
+        assert np.all((total > low) & (total < high))
+
+
 def test_images_are_rendered_once_for_each_dither(monkeypatch):
     calls = []
     real = light_curve_fit.count_rate

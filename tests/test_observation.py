@@ -10,7 +10,7 @@ from astropy.coordinates import SkyCoord
 from scipy.integrate import trapezoid
 
 import napari_issis as ni
-from napari_issis.instrument import CHANNELS
+from napari_issis.instruments import ISSIS
 from napari_issis.limits import count_rate_warnings
 from napari_issis.source_counts import signal_to_noise
 
@@ -29,7 +29,7 @@ def test_numbers_of_the_paper():
 
 def test_pivot_wavelength_by_quadrature():
     """sqrt(int lambda dl / int dl / lambda): catches a band centre in its place."""
-    for channel in CHANNELS.values():
+    for channel in ISSIS.channels.values():
         w = np.linspace(*channel.band, 200001)
         expected = np.sqrt(trapezoid(w, w) / trapezoid(1 / w, w))
         assert channel.pivot == pytest.approx(expected, rel=1e-8)

@@ -8,7 +8,7 @@ from astropy.io import fits
 from scipy import integrate, special
 
 import napari_issis as ni
-from napari_issis.instrument import CHANNELS
+from napari_issis.instruments import ISSIS
 from napari_issis.psf import fwhm
 
 
@@ -116,7 +116,7 @@ def test_band_average_close_to_its_kinks(obscuration, ratio):
 
 
 def test_default_psfs_are_a_tenth_of_an_arcsecond():
-    for channel in CHANNELS.values():
+    for channel in ISSIS.channels.values():
         assert fwhm(channel.psf) == pytest.approx(0.10, abs=0.002)
 
 
@@ -132,6 +132,7 @@ def test_fwhm_of_known_profiles():
         (lambda: ni.GaussianPSF(np.nan), "fwhm is nan"),
         (lambda: ni.MoffatPSF(0.1, 1.0), "beta is 1"),
         (lambda: ni.TelescopePSF(-1), "diameter is -1"),
+        (lambda: ni.TelescopePSF(1e6), "diameter is 1e.06; apertures of at most 100 metres"),
         (lambda: ni.TelescopePSF(1.7, 1.0), "obscuration is 1"),
         (lambda: ni.TelescopePSF(1.7, 0.3, (3000, 2000)), "lower limit exceeds"),
         (lambda: ni.TelescopePSF(1.7, 0.3, np.inf), "band is inf"),
@@ -148,7 +149,8 @@ def test_bad_parameters(make, message):
 
 
 def test_image_psf_from_fits(tmp_path):
-    samples = np.arange(12.0).reshape(3, 4)
+    row = np.exp(-0.5 * (np.arange(-5, 6) / 1.5) ** 2)
+    samples = np.outer(np.exp(-0.5 * (np.arange(-6, 7) / 1.5) ** 2), row)
     fits.PrimaryHDU(samples).writeto(tmp_path / "bare.fits")
     with pytest.raises(ValueError, match="pixel scale"):
         ni.ImagePSF.from_fits(tmp_path / "bare.fits")
@@ -160,3 +162,10 @@ def test_image_psf_from_fits(tmp_path):
     assert ni.ImagePSF.from_fits(tmp_path / "psf.fits") == given
     assert hash(given) == hash(ni.ImagePSF(samples, 0.01))
     assert given != ni.ImagePSF(samples, 0.02)
+
+
+@pytest.mark.parametrize("psf", [ni.TelescopePSF(80.0, band=500.0), ni.GaussianPSF(1e-6)])
+def test_a_psf_too_sharp_for_the_pixels_is_refused(psf):
+    """A mesh for it would need terabytes: no MemoryError after a minute."""
+    with pytest.raises(ValueError, match=r"cycles per pixel.*give it a blur"):
+        ni.count_rate(ni.source("point", 8, 8), ni.Observation(shape=(16, 16), psf=psf))

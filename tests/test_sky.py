@@ -5,7 +5,7 @@ import pytest
 
 import napari_issis as ni
 from napari_issis.exposure import accuracy_for_counts
-from napari_issis.instrument import CHANNELS
+from napari_issis.instruments import ISSIS
 from napari_issis.sky import CIS, HIGH_ORBIT, paper_estimate
 from napari_issis.sky_tables import EARTHSHINE_HIGH, LINES, WAVELENGTH, ZODIACAL_HIGH
 
@@ -70,7 +70,7 @@ def test_the_papers_two_numbers(channel):
     width = BAND[channel][1] - BAND[channel][0]
     continuum = (0.5 * at[0] + 10 ** (-0.4 * 0.6) * at[1]) * RATIO[channel] * PIXEL
     geocorona = lines * RATIO[channel] / width * PIXEL
-    made = paper_estimate(CHANNELS[channel])
+    made = paper_estimate(ISSIS.channels[channel])
     assert made["earthshine and zodiacal light"] == pytest.approx(continuum, rel=1e-9, abs=0)
     assert made["geocorona"] == pytest.approx(geocorona, rel=1e-9, abs=0)
     total, part = PAPER[channel]
@@ -87,8 +87,8 @@ def test_the_default_is_the_papers_bit_for_bit(channel, first, second):
     assert observation.sky is CIS
     assert observation.sky_rate == PAPER[channel][0] * (first[1] * second[1])
     assert observation.cps_per_flux == RATIO[channel] * (first[1] * second[1])
-    assert observation.pivot == CHANNELS[channel].pivot
-    assert observation.effective_psf is CHANNELS[channel].psf
+    assert observation.pivot == ISSIS.channels[channel].pivot
+    assert observation.effective_psf is ISSIS.channels[channel].psf
     parts = observation.sky_components
     assert sum(parts.values()) == pytest.approx(observation.sky_rate, rel=1e-12, abs=0)
     assert parts["earthshine and zodiacal light"] == pytest.approx(

@@ -14,6 +14,8 @@ from .filters import Filter
 from .forecast import forecast
 from .host_arcs import host_arcs
 from .image_psf import ImagePSF
+from .instrument import Instrument
+from .instruments import INSTRUMENTS
 from .lens_delays import isothermal_delays
 from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
@@ -28,6 +30,7 @@ from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
 from .source_counts import expected_counts, signal_to_noise
+from .source_image import SourceImage, image_source
 from .sources import source
 from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 
@@ -62,6 +65,7 @@ _LATER = {
 }
 
 __all__ = [
+    "INSTRUMENTS",
     "SKIES",
     "BlackBody",
     "Catalogue",
@@ -76,12 +80,14 @@ __all__ = [
     "Flat",
     "GaussianPSF",
     "ImagePSF",
+    "Instrument",
     "Line",
     "MoffatPSF",
     "Monitoring",
     "Observation",
     "PowerLaw",
     "Sky",
+    "SourceImage",
     "Spectrum",
     "TableSpectrum",
     "TelescopePSF",
@@ -93,6 +99,7 @@ __all__ = [
     "fit_light_curves",
     "forecast",
     "host_arcs",
+    "image_source",
     "isothermal_delays",
     "lens_images",
     "lensed_quasar",

@@ -8,7 +8,6 @@ from typing import Any
 
 import astropy.units as u
 import numpy as np
-from astropy.stats import sigma_clip as clipped
 from astropy.table import QTable
 from numpy.typing import NDArray
 
@@ -233,6 +232,7 @@ def _annulus_values(
     image: Array, apertures: _Apertures, i: int, annulus: tuple[float, float], clip: float | None
 ) -> Array:
     """Pixels whose centres lie in the annulus of an aperture, the clipped ones left out."""
+    from astropy.stats import sigma_clip as clipped
     from photutils.aperture import EllipticalAnnulus
 
     inner, outer = annulus

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 from astropy.table import Table
 from numpy.typing import NDArray
 
-from .instrument import LIMITS
 from .observation import Observation
 from .render import peaks
 from .render.optics import Optics
@@ -37,7 +38,7 @@ def bright_sources(
         lies on the light of another one is left out: each gives a tenth of the rate there, or
         more, by an estimate of its own highest pixel. Centres outside the frame are not seen.
     """
-    limit = LIMITS.local - observation.background_rate
+    limit = (observation.channel_data.local_limit or inf) - observation.background_rate
     if rate.size == 0 or len(sources) == 0 or rate.max() <= limit:
         return np.empty(0, dtype=np.int64)
     arrays, own_rate = sources_and_rates(sources, observation)

@@ -10,7 +10,8 @@ import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
 
-from .instrument import PIXEL_SCALE
+from .instruments import PIXEL_SCALE
+from .psf import positive
 from .sources import FARTHEST
 
 Array = NDArray[np.float64]
@@ -50,6 +51,8 @@ class ClusterProfile:
         1 - b/a of the isopleths, in [0, 1).
     pa : float or Quantity
         Position angle of the major axis in degrees, from +y counter-clockwise towards -x.
+    pixel_scale : float
+        Arcsec per pixel, for a radius given as an angle; by default that of ISSIS.
 
     Raises
     ------
@@ -63,6 +66,7 @@ class ClusterProfile:
     concentration: float = 1.0
     ellipticity: float = 0.0
     pa: Any = 0.0
+    pixel_scale: float = PIXEL_SCALE
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -76,7 +80,9 @@ class ClusterProfile:
         if not max(abs(x), abs(y)) <= FARTHEST:
             raise ValueError(f"centre is {self.centre!r}; it must be within {FARTHEST:g} pixels.")
         set_(self, "centre", (x, y))
-        radius = _number("radius", self.radius, u.pix)
+        scale = positive("pixel_scale", self.pixel_scale, "arcsec per pixel")
+        set_(self, "pixel_scale", scale)
+        radius = _number("radius", self.radius, u.pix, scale)
         if not 0 < radius <= LARGEST_RADIUS:
             raise ValueError(
                 f"radius is {radius:g}; it must be above 0 and at most {LARGEST_RADIUS:g} pixels."
@@ -160,8 +166,13 @@ def _king_number(r: Array, tidal: float) -> Array:
     return np.asarray(np.log1p(x) - 4 * x / (np.sqrt(1 + x) + 1) / sqrt(edge) + x / edge)
 
 
-def _number(name: str, value: Any, unit: u.UnitBase = u.dimensionless_unscaled) -> float:
-    scale = u.pixel_scale(PIXEL_SCALE * u.arcsec / u.pix)
+def _number(
+    name: str,
+    value: Any,
+    unit: u.UnitBase = u.dimensionless_unscaled,
+    pixel_scale: float | None = None,
+) -> float:
+    scale = [] if pixel_scale is None else u.pixel_scale(pixel_scale * u.arcsec / u.pix)
     try:
         number = float(u.Quantity(value, getattr(value, "unit", unit)).to_value(unit, scale))
     except (TypeError, ValueError):

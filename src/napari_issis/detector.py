@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .instrument import LIMITS
+from .instruments import ISSIS
 from .psf import positive
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Detector:
 
     @classmethod
     def losing(
-        cls, loss: float = 0.01, *, rate: float = LIMITS.local, rollover: bool = False
+        cls, loss: float = 0.01, *, rate: float | None = None, rollover: bool = False
     ) -> Detector:
         """Return a detector that loses a given share of the light at a given rate.
 
@@ -70,9 +70,9 @@ class Detector:
         ----------
         loss : float
             Share of the photons that is lost there, between 0 and 1.
-        rate : float
-            True rate in cps per pixel; by default 22, where HST ACS/SBC loses 1 % (ACS
-            Instrument Handbook, section 4.5).
+        rate : float, optional
+            True rate in cps per pixel; by default the local limit of ISSIS, 22, where HST
+            ACS/SBC loses 1 % (ACS Instrument Handbook, section 4.5).
         rollover : bool
             As for the class.
 
@@ -84,12 +84,21 @@ class Detector:
         loss = positive("loss", loss, "1 (a share)", zero=True)
         if loss >= 1:
             raise ValueError(f"loss is {loss}; it must be a share from 0 to below 1.")
-        rate = positive("rate", rate, "cps per pixel")
+        limit = ISSIS.channels[ISSIS.default_channel].local_limit if rate is None else rate
+        rate = positive("rate", limit, "cps per pixel")
         return cls(loss / ((1 - loss) * rate), rollover)
 
     def detected(self, rate: Array) -> Array:
         """Return the rate that is counted of a true rate, cps per pixel, any shape."""
         return rate / (1 + rate * self.dead_time) if self.dead_time else rate
+
+    def received(self, rate: Array) -> Array:
+        """Return the true rate of which a rate is counted, cps per pixel, any shape.
+
+        Infinite from one count per dead time on.
+        """
+        seeing = 1 - rate * self.dead_time
+        return np.divide(rate, seeing, out=np.full_like(rate, np.inf), where=seeing > 0)
 
     def stored(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the numbers that the memory holds after these counts, any shape."""

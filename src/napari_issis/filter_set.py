@@ -1,77 +1,134 @@
-"""The filters that the wheels can hold by name: neutral ones, and illustrative curves.
-
-Only the neutral filters are the paper's. Gomez de Castro et al. 2014 (Ap&SS 354, 177) speak of
-"long-pass and narrow band filters", and their sensitivity table implies narrow bands at 1215,
-1306, 1335, 1550 and 2500 A; names, widths, transmissions and long-pass edges were not
-published. The curves here show what such filters do. All but their central wavelengths is
-assumed.
-"""
+"""The filters that an instrument's wheels can hold: neutral ones, and curves by a few numbers."""
 
 from __future__ import annotations
 
-from types import MappingProxyType
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from .facts import Fact, check_numbers, facts_of, number
 from .filters import Filter
-from .instrument import FILTERS
+
+# Where long-pass filters end, angstrom: beyond every band.
+FAR_END = 1e5
 
 
-def narrow_band(name: str, centre: float, fwhm: float, peak: float) -> Filter:
-    """Make a Gaussian narrow-band filter.
+@dataclass(frozen=True)
+class _Named:
+    name: str
 
-    Parameters
+    def __post_init__(self) -> None:
+        check_numbers(self)
+
+    @property
+    def illustrative(self) -> bool:
+        """Whether it was made up to show what such a filter does."""
+        return any(one.status == "illustrative" for one in facts_of(self).values())
+
+
+@dataclass(frozen=True)
+class NeutralFilter(_Named):
+    """A filter that passes the same share at all wavelengths."""
+
+    transmittance: float = number(low=0.0, above=True)
+    facts: Mapping[str, Fact] = field(default_factory=dict, compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class NarrowBand(_Named):
+    """A Gaussian narrow-band filter.
+
+    Attributes
     ----------
-    name : str
-        The filter's name.
     centre, fwhm : float
         Central wavelength and full width at half maximum, angstrom.
     peak : float
         Largest transmission.
     """
-    offset = np.linspace(-2.5, 2.5, 81)
-    return Filter(name, centre + fwhm * offset, peak * np.exp(-4 * np.log(2) * offset**2))
+
+    centre: float = number("Angstrom", low=10, high=1e5)
+    fwhm: float = number("Angstrom", high=1e4, above=True)
+    peak: float = number(above=True)
+    facts: Mapping[str, Fact] = field(default_factory=dict, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.centre <= 2.5 * self.fwhm:
+            raise ValueError(
+                f"fwhm: value is {self.fwhm:g}; it must be below 0.4 of the centre, "
+                f"{self.centre:g} A, or the filter would reach wavelength 0."
+            )
+
+    @cached_property
+    def curve(self) -> Filter:
+        """The curve."""
+        offset = np.linspace(-2.5, 2.5, 81)
+        transmission = self.peak * np.exp(-4 * np.log(2) * offset**2)
+        return Filter(self.name, self.centre + self.fwhm * offset, transmission)
 
 
-def long_pass(name: str, edge: float, width: float, peak: float) -> Filter:
-    """Make a long-pass filter.
+@dataclass(frozen=True)
+class LongPass(_Named):
+    """A long-pass filter.
 
-    Parameters
+    Attributes
     ----------
-    name : str
-        The filter's name.
     edge : float
         Wavelength of half the largest transmission, angstrom.
     width : float
         Range over which the transmission rises linearly from 0, angstrom.
     peak : float
-        Transmission beyond, as far as 4000 A.
+        Transmission beyond.
     """
-    wavelength = np.array([edge - width / 2, edge + width / 2, 4000.0])
-    return Filter(name, wavelength, np.array([0.0, peak, peak]))
+
+    edge: float = number("Angstrom", low=10, high=5e4)
+    width: float = number("Angstrom", high=1e4, above=True)
+    peak: float = number(above=True)
+    facts: Mapping[str, Fact] = field(default_factory=dict, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.width >= 2 * self.edge:
+            raise ValueError(
+                f"width: value is {self.width:g}; it must be below twice the edge, "
+                f"{self.edge:g} A, or the filter would reach wavelength 0."
+            )
+
+    @cached_property
+    def curve(self) -> Filter:
+        """The curve."""
+        wavelength = np.array([self.edge - self.width / 2, self.edge + self.width / 2, FAR_END])
+        return Filter(self.name, wavelength, np.array([0.0, self.peak, self.peak]))
 
 
-# Narrow bands: centres from Gomez de Castro et al. 2014, Table 1; widths and peaks assumed.
-# Long-pass edges: about the short-wavelength limits of CaF2, BaF2, crystal quartz (those of
-# HST ACS/SBC F125LP, F140LP, F150LP) and, in the NUV, beyond [O II] 2471; assumed.
-ILLUSTRATIVE_FILTERS = MappingProxyType(
-    {
-        made.name: made
-        for made in (
-            narrow_band("N1215", 1215.7, 60.0, 0.10),
-            narrow_band("N1306", 1306.0, 40.0, 0.15),
-            narrow_band("N1335", 1335.0, 40.0, 0.15),
-            narrow_band("N1550", 1550.0, 120.0, 0.40),
-            narrow_band("N2500", 2500.0, 120.0, 0.40),
-            long_pass("LP1250", 1250.0, 20.0, 0.80),
-            long_pass("LP1370", 1370.0, 20.0, 0.80),
-            long_pass("LP1480", 1480.0, 40.0, 0.80),
-            long_pass("LP2600", 2600.0, 60.0, 0.80),
-        )
-    }
-)
-FILTER_NOTE = (
-    "This filter is illustrative: no curve of an ISSIS filter has been published. Its width, "
-    "transmission and edges are assumed."
-)
-FILTER_NAMES = (*FILTERS, *ILLUSTRATIVE_FILTERS)
+@dataclass(frozen=True)
+class CurveFilter(_Named):
+    """A filter given by samples of its transmission, linear in between, 0 outside them.
+
+    Attributes
+    ----------
+    wavelength : tuple of float
+        In angstrom, rising.
+    transmission : tuple of float
+        As many.
+    """
+
+    wavelength: tuple[float, ...] = number("Angstrom", low=1, high=1e6, count=None, rising=True)
+    transmission: tuple[float, ...] = number(count=None)
+    facts: Mapping[str, Fact] = field(default_factory=dict, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        # it says what is wrong with a curve
+        _ = self.curve
+
+    @cached_property
+    def curve(self) -> Filter:
+        """The curve."""
+        return Filter(self.name, np.array(self.wavelength), np.array(self.transmission))
+
+
+NamedFilter = NeutralFilter | NarrowBand | LongPass | CurveFilter
+FILTER_KINDS = (NeutralFilter, NarrowBand, LongPass, CurveFilter)

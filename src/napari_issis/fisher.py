@@ -21,7 +21,7 @@ from .observation import Observation
 from .render.derivatives import derivatives
 from .render.optics import Optics
 from .source_rates import sources_and_rates
-from .sources import SourceArrays
+from .sources import IMAGE, SourceArrays
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -94,7 +94,7 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     parts = derivatives(optics, arrays, level, share, observation.shape)
     expected = rate + sky
     expected = np.maximum(expected, DARKEST * float(expected.max(initial=0.0)))
-    counts = np.where(arrays.kind == "point", 3, PARAMETERS)
+    counts = np.where(np.isin(arrays.kind, ("point", IMAGE)), 3, PARAMETERS)
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
     scale = np.repeat(rates, counts)
     scale[first[:-1]] = 1.0

@@ -10,13 +10,12 @@ import numpy as np
 from astropy.io import fits
 from numpy.typing import ArrayLike
 
-from .filter_set import FILTER_NOTE, ILLUSTRATIVE_FILTERS
 from .filters import Filter
 from .fits_light_path import sky_description
 from .image_psf import ImagePSF
-from .instrument import PSF_NOTE
 from .observation import Observation
 from .psf import PSF, GaussianPSF, MoffatPSF, TelescopePSF
+from .sources import spectrum_texts
 
 if TYPE_CHECKING:
     from .exposure import Exposure
@@ -36,8 +35,9 @@ def observation_header(exposure: Exposure) -> fits.Header:
     low, high = observation.channel_data.band
     psf = observation.effective_psf
     header = fits.Header()
-    header["TELESCOP"] = ("WSO-UV", "telescope")
-    header["INSTRUME"] = (observation.instrument, "camera")
+    if observation.instrument.telescope:
+        header["TELESCOP"] = (observation.instrument.telescope, "telescope")
+    header["INSTRUME"] = (observation.instrument.name, "camera")
     header["CHANNEL"] = (observation.channel, "channel of the camera")
     header["FILTER1"] = (observation.filter_names[0], "filter in wheel 1")
     header["FILTER2"] = (observation.filter_names[1], "filter in wheel 2")
@@ -45,10 +45,10 @@ def observation_header(exposure: Exposure) -> fits.Header:
     header["WAVEMAX"] = (high, "[Angstrom] upper end of the band")
     header["EXPTIME"] = (observation.exposure, "[s] exposure time")
     header["OBSTYPE"] = ("SIMULATION", "no real observation")
-    header["CPSFLUX"] = (observation.cps_per_flux, "[ct/s] for 1 erg/s/cm2/A, with filters")
+    header["CPSFLUX"] = (observation.cps_per_flux, "[ct/s] 1 erg/s/cm2/A, flat, with filters")
     header["SKYRATE"] = (observation.sky_rate, "[ct/s/pixel] sky, with filters")
     header["SKYMODEL"] = sky_description(observation)
-    header["DARKRATE"] = (observation.dark, "[ct/s/pixel] of the detector itself")
+    header["DARKRATE"] = (observation.dark_rate, "[ct/s/pixel] of the detector itself")
     detector = observation.detector
     header["DEADTIME"] = (detector.dead_time, "[s] of a pixel after each count; 0: no loss")
     header["ROLLOVER"] = (detector.rollover, "T: the counts are modulo 65536")
@@ -67,11 +67,18 @@ def observation_header(exposure: Exposure) -> fits.Header:
         datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S"),
         "UTC at which this file was written",
     )
-    if observation.psf_assumed:
-        header["COMMENT"] = PSF_NOTE
+    camera = observation.instrument
+    if observation.psf_assumed and camera.psf_note:
+        header["COMMENT"] = camera.psf_note
+    texts = spectrum_texts(exposure.sources)
+    if texts is not None and not np.isin(texts, ("", "flat")).all():
+        header["COMMENT"] = (
+            "CPSFLUX holds for a flat spectrum; sources of this exposure have others, which the "
+            "column spectrum of the extension SOURCES names."
+        )
     for number, one in enumerate(observation.filters, start=1):
-        if not isinstance(one, Filter) and one in ILLUSTRATIVE_FILTERS:
-            header["COMMENT"] = f"FILTER{number}: {FILTER_NOTE}"
+        if not isinstance(one, Filter) and camera.is_illustrative(one) and camera.filter_note:
+            header["COMMENT"] = f"FILTER{number}: {camera.filter_note}"
     return header
 
 

@@ -10,7 +10,9 @@ A file holds, in this order,
 * ``SPECTRA`` and ``SAMPLES``, where sources have spectra from files (`fits_spectra`);
 * ``OBSERVATION``, one row with the exact values of the observation, of which the header's
   cards are the readable copy;
+* ``INSTRUMENT``, all that is known of the camera, as the bytes of its TOML file;
 * ``PSF``, where an image serves as the PSF;
+* ``LIGHT1``, ``LIGHT2`` ..., the images that sources are;
 * ``FILTER1``, ``FILTER2``, where a curve of the user's serves as a filter.
 """
 
@@ -29,9 +31,14 @@ from .detector import Detector
 from .exposure import Exposure
 from .fits_header import observation_header, wcs_header
 from .fits_light_path import filter_hdus, sky_values, stored_filters, stored_sky
+from .fits_source_images import image_hdus, keep_images
 from .fits_spectra import spectrum_hdus, with_stored_spectra
 from .fits_table import open_fits, read_table, table_hdu
 from .image_psf import ImagePSF
+from .instrument import Instrument
+from .instrument_file import parse_instrument
+from .instrument_text import instrument_text
+from .instruments import instrument_named
 from .observation import Observation
 from .psf import PSF, GaussianPSF, MoffatPSF, TelescopePSF
 from .safe_write import replacing
@@ -123,7 +130,7 @@ def write_exposure(
 def scene_hdus(
     sources: Table, observation: Observation, seed: int, clipped: float = 0.0
 ) -> list[Any]:
-    """Make the extensions from which a scene can be told: sources, spectra, observation and so on.
+    """Make the extensions from which a scene can be told: sources, observation and so on.
 
     Raises
     ------
@@ -131,16 +138,18 @@ def scene_hdus(
         If a column, the PSF or the sky cannot be stored; the message names it.
     """
     record = _record(observation, seed, clipped)
+    camera = np.frombuffer(instrument_text(observation.instrument).encode(), np.uint8)
     hdus = [
         table_hdu(sources, "SOURCES"),
         *spectrum_hdus(sources),
         table_hdu(record, "OBSERVATION"),
+        fits.ImageHDU(camera, name="INSTRUMENT"),
     ]
     if isinstance(observation.psf, ImagePSF):
         psf = observation.psf
         scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
         hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
-    return hdus + filter_hdus(observation)
+    return hdus + image_hdus(sources) + filter_hdus(observation)
 
 
 def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
@@ -165,6 +174,7 @@ def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
     row = {name: record[name][0] for name in record.colnames}
     observation = _observation(row, hdus)
     sources = with_stored_spectra(read_table(hdus["SOURCES"]), hdus)
+    keep_images(hdus)
     check_sources(sources)
     return sources, observation, int(row["SEED"]), float(row["CLIPPED"])
 
@@ -275,14 +285,14 @@ def _record(observation: Observation, seed: int, clipped: float) -> Table:
     psf = observation.effective_psf
     values: dict[str, Any] = {
         "LAYOUT": LAYOUT,
-        "INSTRUME": observation.instrument,
+        "INSTRUME": observation.instrument.name,
         "CHANNEL": observation.channel,
         "FILTER1": observation.filter_names[0],
         "FILTER2": observation.filter_names[1],
         "EXPOSURE": observation.exposure,
         "NY": observation.shape[0],
         "NX": observation.shape[1],
-        "DARK": observation.dark,
+        "DARK": np.nan if observation.dark is None else observation.dark,
         "DEAD_TIME": observation.detector.dead_time,
         "ROLLOVER": observation.detector.rollover,
         "BACKGROUND": np.nan if observation.background is None else observation.background,
@@ -304,9 +314,9 @@ def _observation(row: dict[str, Any], hdus: fits.HDUList) -> Observation:
     pointing = None
     if not np.isnan(row["RA"]):
         pointing = SkyCoord(row["RA"], row["DEC"], unit="deg", frame="icrs")
-    background = float(row["BACKGROUND"])
+    background, dark = float(row["BACKGROUND"]), float(row.get("DARK", 0.0))
     return Observation(
-        instrument=str(row["INSTRUME"]),
+        instrument=_instrument(row, hdus),
         channel=str(row["CHANNEL"]),
         filters=stored_filters(row, hdus),
         exposure=float(row["EXPOSURE"]),
@@ -316,10 +326,20 @@ def _observation(row: dict[str, Any], hdus: fits.HDUList) -> Observation:
         pointing=pointing,
         roll=float(row["ROLL"]),
         sky=stored_sky(row),
-        dark=float(row.get("DARK", 0.0)),
+        dark=None if np.isnan(dark) else dark,
         # files written before there were any name none
         detector=Detector(float(row.get("DEAD_TIME", 0.0)), bool(row.get("ROLLOVER", False))),
     )
+
+
+def _instrument(row: dict[str, Any], hdus: fits.HDUList) -> Instrument:
+    """Return the stored camera; files written before there were others name one of ours."""
+    if "INSTRUMENT" not in [hdu.name for hdu in hdus]:
+        return instrument_named(str(row["INSTRUME"]))
+    hdu = hdus["INSTRUMENT"]
+    if not hdu.is_image or len(hdu.shape) != 1 or hdu.data.dtype != np.uint8:
+        raise ValueError("the extension INSTRUMENT holds no text.")
+    return parse_instrument(hdu.data.tobytes(), "the extension INSTRUMENT")
 
 
 def _psf_values(psf: PSF) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from .instrument import PIXEL_SCALE
+from .instruments import PIXEL_SCALE
 from .lens_model import IsothermalLens, source_offset
 from .psf import positive
 from .sources import BRIGHTEST, INDEX_RANGE

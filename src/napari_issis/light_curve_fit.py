@@ -163,7 +163,9 @@ def _simulator(monitoring: Monitoring) -> Callable[[int], NDArray[np.int64]]:
         if one.render not in rates:
             if len(rates) >= KEPT:
                 rates.clear()
-            rates[one.render] = rate_of(one.sources, one.observation, monitoring.tolerance)
+            rates[one.render] = rate_of(
+                one.sources, one.observation, monitoring.tolerance, one.images
+            )
         return exposed(rates[one.render], one).counts
 
     return simulated

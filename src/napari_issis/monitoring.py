@@ -19,6 +19,7 @@ from .light_curves import LightCurve, flux_factors
 from .monitoring_tasks import add_shifted, run, stack
 from .moved_frame import move_frame
 from .observation import Observation
+from .source_image import SourceImage, kept_images
 from .source_rates import sources_and_rates
 from .sources import FLUX_UNIT, check_sources
 
@@ -61,6 +62,8 @@ class PlannedExposure:
     seed: int
     # Exposures with the same number share a render.
     render: int
+    # Those that sources are, for workers in other processes.
+    images: tuple[SourceImage, ...] = field(default=(), repr=False)
 
     @property
     def file_name(self) -> str:
@@ -250,7 +253,7 @@ def monitor(
         If a value is out of range; the message names it.
     """
     observation = Observation() if observation is None else observation
-    arrays = check_sources(sources, pivot=observation.pivot)
+    arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
     seed = checked_seed(seed)
     whole = tuple(one if isinstance(one, Epoch) else Epoch(_time(one)) for one in epochs)
     if not whole:
@@ -262,6 +265,7 @@ def monitor(
         raise ValueError(f"there are {len(steps)} dithers and {exposures} exposures; give as many.")
     times = np.array([_time(one.time) for one in whole])
     factors = flux_factors(light_curves, delays, times, len(arrays))
+    images = tuple(kept_images(sources).values())
     planned: list[PlannedExposure] = []
     renders: dict[Any, int] = {}
     for number, epoch in enumerate(whole):
@@ -278,7 +282,7 @@ def monitor(
             own = np.random.SeedSequence(seed, spawn_key=(number, k)).generate_state(1, np.uint64)
             planned.append(
                 PlannedExposure(
-                    number, k, float(times[number]), step, seen, frame, int(own[0]), render
+                    number, k, float(times[number]), step, seen, frame, int(own[0]), render, images
                 )
             )
     return Monitoring(
@@ -288,7 +292,7 @@ def monitor(
 
 def _scene_key(sources: QTable, observation: Observation) -> Any:
     """Return what the count rate depends on."""
-    arrays = check_sources(sources, pivot=observation.pivot)
+    arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
     values = tuple(getattr(arrays, name).tobytes() for name in arrays.__dataclass_fields__)
     return observation.replace(exposure=1.0), values
 

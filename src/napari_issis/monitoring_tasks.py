@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .exposure import Exposure, expected_of_rate, expose, noise_ready_rate, same_table
 from .limits import warn_of_count_rates
 from .observation import Observation
+from .source_image import SourceImage
 
 if TYPE_CHECKING:
     from .monitoring import Monitoring, PlannedExposure
@@ -105,15 +106,21 @@ def _rates(plan: Monitoring, dask: Any) -> dict[int, Any]:
         if one.render not in rates:
             name = f"issis-rate-{plan.token}-{one.render}"
             rates[one.render] = render(
-                one.sources, one.observation, plan.tolerance, dask_key_name=name
+                one.sources, one.observation, plan.tolerance, one.images, dask_key_name=name
             )
     return rates
 
 
 def rate_of(
-    sources: QTable, observation: Observation, tolerance: float | None
+    sources: QTable,
+    observation: Observation,
+    tolerance: float | None,
+    images: tuple[SourceImage, ...] = (),
 ) -> tuple[NDArray[np.float64], float]:
-    """Render what an exposure is drawn from: its rate, and the ripple removed from it."""
+    """Render what an exposure is drawn from: its rate, and the ripple removed from it.
+
+    The images that sources are come along, as another process does not know them by name.
+    """
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
     warn_of_count_rates(rate, sources, observation)
     return rate, clipped

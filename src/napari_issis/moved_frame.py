@@ -41,7 +41,7 @@ def move_frame(
     table = QTable(sources, copy=True)
     if roll == 0 and tuple(offset) == (0, 0):
         return table, observation
-    arrays = check_sources(sources, pivot=observation.pivot)
+    arrays = check_sources(sources, pivot=observation.pivot, pixel_scale=observation.pixel_scale)
     ny, nx = observation.shape
     x_0, y_0 = (nx - 1) / 2, (ny - 1) / 2
     c, s = cos(radians(roll)), sin(radians(roll))

@@ -7,20 +7,20 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isfinite
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import astropy.units as u
 from astropy.coordinates import SkyCoord
 
 from .detector import IDEAL, Detector, checked_detector
-from .filter_set import FILTER_NAMES, ILLUSTRATIVE_FILTERS
 from .filters import Filter
-from .instrument import CHANNELS, FILTERS, PIXEL_SCALE, Channel
+from .instrument import Channel, Instrument
+from .instruments import instrument_named
 from .passband import Passband
 from .psf import PSF
-from .sky import CIS, SkyModel
+from .sky import CIS, Sky, SkyModel
+from .sky_tables import WAVELENGTH
 
-INSTRUMENTS = ("ISSIS",)
 OPEN = ("open", "open")
 
 
@@ -30,11 +30,12 @@ class Observation:
 
     Parameters
     ----------
-    channel : {"NUV", "FUV"}
-        The channel.
+    channel : str, optional
+        A channel of the instrument, by default its `Instrument.default_channel`; for ISSIS
+        ``NUV`` (the default) or ``FUV``.
     filters : (str or Filter, str or Filter)
-        One filter for each of the two wheels: ``open``, a neutral one (``NF1``, ``NF2``), the
-        name of an illustrative curve (see `napari_issis.filter_set`), or a `Filter`.
+        One filter for each of the two wheels: ``open``, one of the instrument's by name (for
+        ISSIS the neutral ``NF1`` and ``NF2``, and illustrative curves), or a `Filter`.
     exposure : float
         Exposure time, s.
     shape : (int, int)
@@ -48,14 +49,15 @@ class Observation:
         Sky position of the frame's centre.
     roll : float
         Angle from north to the frame's +y axis, counter-clockwise through east, degrees.
-    instrument : str
-        The instrument's name.
-    sky : SkyModel
-        The sky by components: `napari_issis.sky.CIS`, which holds the paper's constants, or a
-        `napari_issis.sky.Sky`.
-    dark : float
-        Counts of the detector itself, cps per pixel, which no filter reduces. None is
-        published for ISSIS, and the paper has none.
+    instrument : str or Instrument
+        The camera, or the name of one that comes with the program.
+    sky : SkyModel, optional
+        The sky by components: `napari_issis.sky.CIS`, the constants of the paper, or a
+        `napari_issis.sky.Sky`. By default CIS where the instrument has such constants, and
+        else ``Sky()``.
+    dark : float, optional
+        Counts of the detector itself, cps per pixel, which no filter reduces; by default the
+        channel's (0 for ISSIS: none is published, and the paper has none).
     detector : Detector
         Coincidence loss and 16-bit rollover; none by default.
 
@@ -70,7 +72,7 @@ class Observation:
     Two observations with the same ``background`` are equal whatever their ``sky``.
     """
 
-    channel: str = "NUV"
+    channel: str = ""
     filters: tuple[str | Filter, str | Filter] = OPEN
     exposure: float = 100.0
     shape: tuple[int, int] = (512, 512)
@@ -78,17 +80,20 @@ class Observation:
     background: float | None = None
     pointing: SkyCoord | None = None
     roll: float = 0.0
-    instrument: str = "ISSIS"
-    sky: SkyModel = CIS
-    dark: float = 0.0
+    instrument: Instrument = "ISSIS"  # type: ignore[assignment]
+    # the instrument's own once the observation is made
+    sky: SkyModel = None  # type: ignore[assignment]
+    dark: float | None = None
     detector: Detector = IDEAL
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        if self.instrument not in INSTRUMENTS:
-            raise ValueError(f"instrument is {self.instrument!r}; known: {', '.join(INSTRUMENTS)}.")
-        if self.channel not in tuple(CHANNELS):
-            raise ValueError(f"channel is {self.channel!r}; known: {', '.join(CHANNELS)}.")
+        camera = _camera(self.instrument)
+        set_(self, "instrument", camera)
+        if not self.channel:
+            set_(self, "channel", camera.default_channel)
+        if self.channel not in tuple(camera.channels):
+            raise ValueError(f"channel is {self.channel!r}; known: {', '.join(camera.channels)}.")
         if not isinstance(self.filters, tuple | list) or len(self.filters) != 2:
             raise ValueError(
                 f"filters is {self.filters!r}; give one filter for each of the two wheels, "
@@ -96,9 +101,9 @@ class Observation:
             )
         set_(self, "filters", tuple(self.filters))
         for one in self.filters:
-            if not isinstance(one, Filter) and one not in FILTER_NAMES:
+            if not isinstance(one, Filter) and one not in camera.filter_names:
                 raise ValueError(
-                    f"filter is {one!r}; known: {', '.join(FILTER_NAMES)}; or give a Filter."
+                    f"filter is {one!r}; known: {', '.join(camera.filter_names)}; or give a Filter."
                 )
         if not self.passband.transmittance > 0:
             low, high = self.passband.band
@@ -116,10 +121,28 @@ class Observation:
                 "background",
                 _number("background", self.background, "cps per pixel", positive=False),
             )
-        set_(self, "dark", _number("dark", self.dark, "cps per pixel", positive=False))
+        if self.dark is not None:
+            set_(self, "dark", _number("dark", self.dark, "cps per pixel", positive=False))
         checked_detector(self.detector)
+        if cast(object, self.sky) is None:
+            set_(self, "sky", Sky() if self.channel_data.sky is None else CIS)
         if not isinstance(self.sky, SkyModel):
             raise ValueError(f"sky is {self.sky!r}; give a Sky, or one of SKIES by its key.")
+        low, high = self.channel_data.band
+        if (
+            self.background is None
+            and isinstance(self.sky, Sky)
+            and not (WAVELENGTH[0] <= low and high <= WAVELENGTH[-1])
+        ):
+            raise ValueError(
+                f"the sky is known from {WAVELENGTH[0]:g} to {WAVELENGTH[-1]:g} A, and "
+                f"{self.channel} is {low:g} to {high:g} A; give background= in cps per pixel."
+            )
+        if self.sky == CIS and self.channel_data.sky is None:
+            raise ValueError(
+                f"sky is CIS, the constants of the paper, and {camera.name} has none; "
+                'give a Sky, such as SKIES["HST average"].'
+            )
         try:
             roll = float(u.Quantity(self.roll, u.deg).value)
         except (TypeError, ValueError):
@@ -139,13 +162,35 @@ class Observation:
             set_(self, "pointing", self.pointing.icrs)
 
     def replace(self, **changes: Any) -> Observation:
-        """Return a copy with some values changed."""
+        """Return a copy with some values changed.
+
+        With another instrument, its own channel, filters and sky take the place of those that
+        it does not have.
+        """
+        if "instrument" in changes:
+            changes = {**self._kept_with(changes["instrument"], changes), **changes}
         return replace(self, **changes)
+
+    def _kept_with(self, instrument: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Replace what another camera lacks."""
+        camera = _camera(instrument)
+        channel = changes.get("channel", self.channel)
+        if channel not in tuple(camera.channels):
+            channel = camera.default_channel
+        kept: dict[str, Any] = {"channel": channel}
+        own = camera.channels[channel]
+        if "filters" not in changes:
+            kept["filters"] = tuple(
+                one if passes(camera, channel, one) else OPEN[0] for one in self.filters
+            )
+        if own.sky is None and self.sky == CIS:
+            kept["sky"] = None
+        return kept
 
     @property
     def channel_data(self) -> Channel:
         """The channel's numbers."""
-        return CHANNELS[self.channel]
+        return self.instrument.channels[self.channel]
 
     @property
     def filter_names(self) -> tuple[str, str]:
@@ -156,16 +201,18 @@ class Observation:
     @property
     def neutral_transmittance(self) -> float:
         """Product of the neutral filters' transmittances; rates and sky scale with it."""
+        neutral = self.instrument.neutral_filters
         first, second = (
-            1.0 if isinstance(one, Filter) else FILTERS.get(one, 1.0) for one in self.filters
+            1.0 if isinstance(one, Filter) else neutral.get(one, 1.0) for one in self.filters
         )
         return first * second
 
     def without_neutral_filters(self) -> Observation:
         """Return a copy with the neutral filters out of the light path."""
+        neutral = self.instrument.neutral_filters
         return self.replace(
             filters=tuple(
-                "open" if not isinstance(one, Filter) and one in FILTERS else one
+                "open" if not isinstance(one, Filter) and one in neutral else one
                 for one in self.filters
             )
         )
@@ -173,12 +220,13 @@ class Observation:
     @property
     def passband(self) -> Passband:
         """The channel's response behind the filters that are curves."""
+        named = self.instrument.filter_curves
         curves = tuple(
-            one if isinstance(one, Filter) else ILLUSTRATIVE_FILTERS[one]
+            one if isinstance(one, Filter) else named[one]
             for one in self.filters
-            if isinstance(one, Filter) or one in ILLUSTRATIVE_FILTERS
+            if isinstance(one, Filter) or one in named
         )
-        return _passband(self.channel, curves)
+        return _passband(self.channel_data, curves)
 
     @property
     def transmittance(self) -> float:
@@ -200,20 +248,25 @@ class Observation:
         """Sky background in cps per pixel, filters included."""
         if self.background is not None:
             return self.background * self.transmittance
-        rate, _ = _sky(self.sky, self.channel, self.passband)
+        rate, _ = _sky(self.sky, self.channel_data, self.passband)
         return rate * self.neutral_transmittance
+
+    @property
+    def dark_rate(self) -> float:
+        """Count rate of the detector itself, cps per pixel: the given one or the channel's."""
+        return self.channel_data.dark if self.dark is None else self.dark
 
     @property
     def background_rate(self) -> float:
         """Sky and dark rate together, cps per pixel."""
-        return self.sky_rate + self.dark
+        return self.sky_rate + self.dark_rate
 
     @property
     def sky_components(self) -> Mapping[str, float]:
         """Sky background in cps per pixel, filters included, by the component's name."""
         if self.background is not None:
             return MappingProxyType({"background": self.sky_rate})
-        _, components = _sky(self.sky, self.channel, self.passband)
+        _, components = _sky(self.sky, self.channel_data, self.passband)
         passed = self.neutral_transmittance
         return MappingProxyType({name: rate * passed for name, rate in components.items()})
 
@@ -233,7 +286,7 @@ class Observation:
     @property
     def pixel_scale(self) -> float:
         """Arcsec per pixel."""
-        return PIXEL_SCALE
+        return self.channel_data.pixel_scale
 
     def _key(self) -> tuple[object, ...]:
         position = None
@@ -247,7 +300,7 @@ class Observation:
             self.psf,
             self.background,
             self.sky if self.background is None else None,
-            self.dark,
+            self.dark_rate,
             self.detector,
             position,
             self.roll,
@@ -262,15 +315,29 @@ class Observation:
 
 
 @lru_cache(maxsize=64)
-def _passband(channel: str, curves: tuple[Filter, ...]) -> Passband:
-    data = CHANNELS[channel]
-    return Passband(data.band, data.cps_per_flux, curves)
+def _passband(channel: Channel, curves: tuple[Filter, ...]) -> Passband:
+    return Passband(channel.band, channel.cps_per_flux, curves, channel.response)
 
 
 @lru_cache(maxsize=64)
-def _sky(sky: SkyModel, channel: str, passband: Passband) -> tuple[float, Mapping[str, float]]:
-    data = CHANNELS[channel]
-    return sky.rate(data, passband), sky.components(data, passband)
+def _sky(sky: SkyModel, channel: Channel, passband: Passband) -> tuple[float, Mapping[str, float]]:
+    return sky.rate(channel, passband), sky.components(channel, passband)
+
+
+def _camera(instrument: Any) -> Instrument:
+    return instrument if isinstance(instrument, Instrument) else instrument_named(instrument)
+
+
+@lru_cache(maxsize=256)
+def passes(camera: Instrument, channel: str, one: str | Filter) -> bool:
+    """Whether a camera has a filter that passes light of a channel."""
+    if not isinstance(one, Filter):
+        if one in camera.neutral_filters:
+            return True
+        if one not in camera.filter_curves:
+            return False
+        one = camera.filter_curves[one]
+    return _passband(camera.channels[channel], (one,)).transmittance > 0
 
 
 def _number(name: str, value: Any, unit: str, *, positive: bool) -> float:

@@ -33,23 +33,32 @@ class Passband:
         Count rate in cps of 1 erg s-1 cm-2 A-1 without filters.
     filters : tuple of Filter
         The curves in the light path.
+    response : Filter, optional
+        Shape of the effective area without filters; constant over the band by default.
 
     Notes
     -----
-    The effective area A without filters is assumed constant over the band, so that the count
-    rate of a flux density F is int A T F lambda / (h c) dlambda with the transmission T
-    for a photon-counting detector. ``cps_per_flux`` fixes A.
+    The count rate of a flux density F is int A T F lambda / (h c) dlambda with the effective
+    area A and the transmission T for a photon-counting detector. ``cps_per_flux`` fixes A.
     """
 
     band: tuple[float, float]
     cps_per_flux: float
     filters: tuple[Filter, ...] = ()
+    response: Filter | None = None
+
+    @cached_property
+    def unfiltered_moment(self) -> float:
+        """Integral of R lambda over the band, R the response without filters."""
+        if self.response is not None:
+            return Passband(self.band, self.cps_per_flux, (self.response,))._moment(1)
+        low, high = self.band
+        return 0.5 * (high**2 - low**2)
 
     @property
     def area(self) -> float:
-        """Effective area without filters, cm2; constant over the band, which is assumed."""
-        low, high = self.band
-        return self.cps_per_flux * HC / (0.5 * (high**2 - low**2))
+        """Largest effective area without filters, cm2; its mean without a response."""
+        return self.cps_per_flux * HC / self.unfiltered_moment
 
     def transmission(self, wavelength: ArrayLike) -> Array:
         """Product of the filters' transmissions, 0 outside the band; wavelengths in angstrom."""
@@ -60,21 +69,29 @@ class Passband:
             value = value * one(wavelength)
         return value
 
+    @property
+    def _curves(self) -> tuple[Filter, ...]:
+        return self.filters if self.response is None else (*self.filters, self.response)
+
+    def relative_response(self, wavelength: ArrayLike) -> Array:
+        """Effective area with the filters over ``area``; wavelengths in angstrom."""
+        value = self.transmission(wavelength)
+        return value if self.response is None else value * self.response(wavelength)
+
     def effective_area(self, wavelength: ArrayLike) -> Array:
         """Effective area with the filters, cm2; wavelengths in angstrom."""
-        return self.area * self.transmission(wavelength)
+        return self.area * self.relative_response(wavelength)
 
     @cached_property
     def transmittance(self) -> float:
         """Share of the counts of a flat spectrum (constant F_lambda) that the filters pass."""
-        low, high = self.band
-        return self._moment(1) / (0.5 * (high**2 - low**2)) if self.filters else 1.0
+        return self._moment(1) / self.unfiltered_moment if self.filters else 1.0
 
     @cached_property
     def pivot(self) -> float:
         """Pivot wavelength, angstrom.
 
-        lambda_p^2 = int T lambda dlambda / int T / lambda dlambda for a constant area
+        lambda_p^2 = int R lambda dlambda / int R / lambda dlambda, R area times transmission
         (Bessell & Murphy 2012, PASP 124, 140, eq. A15).
         """
         return sqrt(self._moment(1) / self._moment(-1))
@@ -114,20 +131,20 @@ class Passband:
         return self.area * float(weights @ np.interp(nodes, wavelength, photons))
 
     def moment_of(self, spectrum: Callable[[Array], Array], knots: Array) -> float:
-        """Integral of T F lambda over the band, for a spectrum F smooth between ``knots``."""
+        """Integral of R T F lambda over the band, for a spectrum F smooth between ``knots``."""
         nodes, weights = self._quadrature(knots)
         return float(weights @ (spectrum(nodes) * nodes))
 
     def _moment(self, power: int) -> float:
-        """Integral of T lambda^power over the band."""
+        """Integral of R T lambda^power over the band."""
         nodes, weights = self._quadrature()
         return float(weights @ nodes**power)
 
     def _quadrature(self, *samples: Array) -> tuple[Array, Array]:
-        """Nodes and weights, the weights times the transmission."""
+        """Nodes and weights, the weights times response and transmission."""
         low, high = self.band
-        knots = np.concatenate([[low, high], *samples, *(one.wavelength for one in self.filters)])
+        knots = np.concatenate([[low, high], *samples, *(one.wavelength for one in self._curves)])
         knots = np.unique(knots[(knots >= low) & (knots <= high)])
         half = 0.5 * np.diff(knots)[:, None]
         nodes = (knots[:-1, None] + half * (1 + _NODES)).ravel()
-        return nodes, (half * _WEIGHTS).ravel() * self.transmission(nodes)
+        return nodes, (half * _WEIGHTS).ravel() * self.relative_response(nodes)

@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
+from .instruments import PIXEL_SCALE
 from .observation import Observation
 from .safe_write import replacing
-from .sources import check_sources
+from .source_image import kept_image
+from .sources import IMAGE, check_sources
 
 SUFFIXES = (".png",)
 SCALES = ("linear", "log", "sqrt")
@@ -27,6 +29,7 @@ ELLIPSE_COLORS = {
     "exponential": "yellow",
     "devaucouleurs": "orange",
     "sersic": "magenta",
+    IMAGE: "dodgerblue",
 }
 # The outline of a star with five points, one of them up, and its radius in pixels of the file.
 STAR_RADIUS = 6.0
@@ -119,6 +122,7 @@ def write_source_png(
     *,
     zoom: int = 1,
     overwrite: bool = False,
+    pixel_scale: float = PIXEL_SCALE,
 ) -> None:
     """Draw a source model to a PNG file: stars, and ellipses that hold half of the light.
 
@@ -134,6 +138,8 @@ def write_source_png(
         Side of the square that each pixel of the frame becomes, 1 to 64.
     overwrite : bool
         Whether an existing file may be replaced.
+    pixel_scale : float
+        Arcsec per pixel, for radii given as angles; by default that of ISSIS.
 
     Raises
     ------
@@ -147,12 +153,14 @@ def write_source_png(
     The lines are one pixel of the file wide, on black, in the colours of `POINT_COLOR` and
     `ELLIPSE_COLORS`.
     """
-    arrays = check_sources(sources)
+    arrays = check_sources(sources, pixel_scale=pixel_scale)
     ny, nx = Observation(shape=shape).shape
     _check_zoom(zoom, (ny, nx))
     picture = Image.new("RGB", (nx * zoom, ny * zoom))
     draw = ImageDraw.Draw(picture)
     reach = np.maximum(arrays.r_half, STAR_RADIUS)
+    for row in np.flatnonzero(arrays.kind == IMAGE):
+        reach[row] *= np.hypot(*kept_image(str(arrays.image[row])).half_sizes)
     near = (np.abs(arrays.x - (nx - 1) / 2) <= nx / 2 + reach) & (
         np.abs(arrays.y - (ny - 1) / 2) <= ny / 2 + reach
     )
@@ -160,6 +168,8 @@ def write_source_png(
     for i, kind in enumerate(seen.kind):
         if kind == "point":
             outline = np.append(STAR, STAR[:1], axis=0) * STAR_RADIUS / zoom
+        elif kind == IMAGE:
+            outline = _rectangle(str(seen.image[i]), seen.r_half[i], seen.pa[i])
         else:
             outline = _ellipse(seen.r_half[i], seen.ellipticity[i], seen.pa[i], zoom)
         x = (seen.x[i] + outline[:, 0] + 0.5) * zoom - 0.5
@@ -167,6 +177,14 @@ def write_source_png(
         points = np.clip(np.rint(np.stack([x, y], axis=1)), -1e6, 1e6)
         draw.line([tuple(point) for point in points], fill=ELLIPSE_COLORS.get(kind, POINT_COLOR))
     _save(picture, path, {"Zoom": str(zoom)}, overwrite=overwrite)
+
+
+def _rectangle(image: str, r_half: float, pa: float) -> NDArray[np.float64]:
+    """Return the corners of an image about its centre, (x, y) in pixels, the first twice."""
+    half_y, half_x = (r_half * half for half in kept_image(image).half_sizes)
+    u, v = half_x * np.array([-1, 1, 1, -1, -1]), half_y * np.array([-1, -1, 1, 1, -1])
+    c, s = np.cos(np.radians(pa)), np.sin(np.radians(pa))
+    return np.stack([u * c - v * s, u * s + v * c], axis=1)
 
 
 def _ellipse(r_half: float, ellipticity: float, pa: float, zoom: int) -> NDArray[np.float64]:

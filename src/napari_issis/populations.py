@@ -10,6 +10,7 @@ from astropy.table import QTable
 
 from .cluster_profile import ClusterProfile
 from .flux_distribution import DEFAULT_SLOPE, draw_fluxes, sample_fluxes
+from .instruments import PIXEL_SCALE
 from .sources import FLUX_UNIT, INDEX_RANGE, KINDS, check_sources
 
 # A thousand to one, as crowded fields have; the brightest is the brightest of the paper's.
@@ -126,6 +127,7 @@ def star_cluster(
     flux_slope: float = DEFAULT_SLOPE,
     flux_sample: Any = None,
     seed: int | None = None,
+    pixel_scale: float = PIXEL_SCALE,
 ) -> QTable:
     """Draw the stars of a cluster, its positions from a projected profile.
 
@@ -142,6 +144,8 @@ def star_cluster(
         with Salpeter's (1955) mass function and F proportional to M^3.5.
     seed : int, optional
         Seed; the same one draws the same cluster.
+    pixel_scale : float
+        Arcsec per pixel, for a radius given as an angle; by default that of ISSIS.
 
     Returns
     -------
@@ -160,7 +164,9 @@ def star_cluster(
     return random_sources(
         "point",
         n,
-        positions=ClusterProfile(profile, centre, radius, concentration, ellipticity, pa),
+        positions=ClusterProfile(
+            profile, centre, radius, concentration, ellipticity, pa, pixel_scale
+        ),
         flux=flux,
         flux_distribution=flux_distribution,
         flux_slope=flux_slope,

@@ -19,6 +19,7 @@ from .annulus import annular_otf, band_averaged_otf
 Array = NDArray[np.float64]
 
 ARCSEC_PER_RADIAN = 180 * 3600 / np.pi
+WIDEST = 100.0  # m
 FWHM_PER_SIGMA = 2 * np.sqrt(2 * np.log(2))
 
 
@@ -48,10 +49,10 @@ class PSF(Protocol):
         """OTF on the grid of frequencies (fy, fx), shape (len(fy), len(fx))."""
 
 
-def positive(name: str, value: float, unit: str, *, zero: bool = False) -> float:
+def positive(name: str, value: float | None, unit: str, *, zero: bool = False) -> float:
     """Return a parameter as a float, or raise a ValueError that names it."""
     try:
-        value = float(value)
+        value = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ValueError(f"{name} is {value!r}; it must be a plain number of {unit}.") from None
     if not np.isfinite(value) or value < 0 or (value == 0 and not zero):
@@ -171,7 +172,7 @@ class TelescopePSF(RadialPSF):
     Parameters
     ----------
     diameter : float
-        Aperture diameter, m.
+        Aperture diameter, m, at most 100.
     obscuration : float
         Linear central obscuration, 0 to below 1.
     band : float or (float, float)
@@ -219,6 +220,11 @@ class TelescopePSF(RadialPSF):
             raise ValueError(f"halo_fwhm is 0 for a halo_share of {share}; give arcsec above 0.")
         set_(self, "halo_share", share)
         set_(self, "diameter", positive("diameter", self.diameter, "metres"))
+        if self.diameter > WIDEST:
+            raise ValueError(
+                f"diameter is {self.diameter:g}; apertures of at most {WIDEST:g} metres can be "
+                "rendered. Is it in another unit?"
+            )
         set_(self, "blur_fwhm", positive("blur_fwhm", self.blur_fwhm, "arcsec", zero=True))
         obscuration = float(self.obscuration)
         if not 0 <= obscuration < 1:

@@ -16,7 +16,6 @@ from .counts import checked_seed
 from .exposure import Exposure, expose, noise_ready_rate
 from .exposure_goal import exposure_for
 from .forecast import forecast
-from .instrument import CHANNELS, FILTERS
 from .limits import CountRateWarning, count_rate_warnings
 from .observation import OPEN, Observation
 from .safe_write import check_target, replacing
@@ -112,7 +111,8 @@ def proposal_sheet(
     shown = _rows(rows, sources, given[0])
     added = ""
     if len(given) == 1:
-        given, added = list(both_channels(given[0])), both_channels(given[0])[1].channel
+        given = list(both_channels(given[0]))
+        added = given[-1].channel if len(given) > 1 else ""
     results = [_result(sources, one, seed, asked) for one in given]
     text = page(
         results,
@@ -127,15 +127,20 @@ def proposal_sheet(
         file.write(text.encode("utf-8"))
 
 
-def both_channels(observation: Observation) -> tuple[Observation, Observation]:
-    """Return an observation and the same one in the other channel.
+def both_channels(observation: Observation) -> tuple[Observation, ...]:
+    """Return an observation and the same one in the next channel of the camera, if it has one.
 
     That has the channel's own PSF and sky; neutral filters stay, others have no counterpart
     and are open.
     """
-    (other,) = (name for name in CHANNELS if name != observation.channel)
+    camera = observation.instrument
+    channels = list(camera.channels)
+    other = channels[(channels.index(observation.channel) + 1) % len(channels)]
+    if other == observation.channel:
+        return (observation,)
     filters = tuple(
-        one if isinstance(one, str) and one in FILTERS else OPEN[0] for one in observation.filters
+        one if isinstance(one, str) and one in camera.neutral_filters else OPEN[0]
+        for one in observation.filters
     )
     changes: dict[str, Any] = {"channel": other, "filters": filters, "psf": None}
     return observation, observation.replace(**changes, background=None)

@@ -13,10 +13,8 @@ from astropy.table import Table
 from numpy.typing import NDArray
 
 from .encircled_energy import encircled_energy
-from .filter_set import FILTER_NOTE, ILLUSTRATIVE_FILTERS
 from .fits_header import psf_description
 from .fits_light_path import sky_description
-from .instrument import PSF_NOTE
 from .observation import Observation
 from .photometry import ab_magnitude
 from .psf import RadialPSF, fwhm
@@ -35,10 +33,6 @@ FORECAST_NOTE = (
     "Forecasts are Cramér-Rao bounds of the Poisson likelihood: the errors of the best fit "
     "possible, of all sources of the scene together, with the PSF, the sky and the Sersic "
     "indices known. Faint blended sources scatter more."
-)
-LIMITS_NOTE = (
-    "Count-rate limits are those of HST ACS/SBC, the nearest analogue: none has been published "
-    "for ISSIS."
 )
 FLUX_NOTE = (
     "Fluxes are mean flux densities over the channel's band, spectra flat in wavelength, "
@@ -320,11 +314,15 @@ def _warnings(results: Sequence[ChannelResult], labels: Sequence[str]) -> str:
 
 def _assumptions(results: Sequence[ChannelResult], added: str) -> list[str]:
     observations = [one.exposure.observation for one in results]
-    texts = [FLUX_NOTE, FORECAST_NOTE, LIMITS_NOTE, AB_NOTE]
-    if any(one.psf_assumed for one in observations):
-        texts.insert(0, PSF_NOTE)
-    curves = {f for one in observations for f in one.filter_names if f in ILLUSTRATIVE_FILTERS}
-    texts += [f"{name}: {FILTER_NOTE}" for name in sorted(curves)]
+    camera = observations[0].instrument
+    texts = [FLUX_NOTE, FORECAST_NOTE, AB_NOTE]
+    if camera.limits_note:
+        texts.append(f"Count-rate limits are those of {camera.limits_note}.")
+    if camera.psf_note and any(one.psf_assumed for one in observations):
+        texts.insert(0, camera.psf_note)
+    names = {name for one in observations for name in one.filter_names}
+    curves = sorted(name for name in names if camera.is_illustrative(name))
+    texts += [f"{name}: {camera.filter_note}" for name in curves]
     if added:
         texts.append(f"{added} was added with the same exposure time and its own PSF and sky.")
     for one in observations:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from math import isfinite
 from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
-from .instrument import PIXEL_SCALE, Channel
+from .instrument import Channel, SkyConstants
 from .passband import Passband
 from .sky_tables import (
     EARTHSHINE,
@@ -21,10 +21,10 @@ from .sky_tables import (
     ZODIACAL,
     ZODIACAL_HIGH,
     Array,
+    Line,
     diffuse_photons,
 )
 
-PIXEL_AREA = PIXEL_SCALE**2  # arcsec2
 # Wavelengths, angstrom, at which the paper must have taken its continuum: see `paper_estimate`.
 PAPER_WAVELENGTHS = MappingProxyType({"FUV": 1400.0, "NUV": 2500.0})
 
@@ -93,20 +93,21 @@ class Sky:
         that the filters block is 0.
         """
         rates = {}
+        area = channel.pixel_scale**2  # arcsec2
         for name, share, high in (
             ("earthshine", EARTHSHINE[self.earthshine], EARTHSHINE_HIGH),
             ("zodiacal light", ZODIACAL[self.zodiacal], ZODIACAL_HIGH),
         ):
             if share:
-                rates[name] = PIXEL_AREA * passband.continuum_rate(WAVELENGTH, share * high)
+                rates[name] = area * passband.continuum_rate(WAVELENGTH, share * high)
         if self.galactic_latitude is not None:
-            photons = PIXEL_AREA * diffuse_photons(self.galactic_latitude)
+            photons = area * diffuse_photons(self.galactic_latitude)
             rates["diffuse galactic light"] = passband.photon_rate(GALEX, photons)
         low, high_ = channel.band
         for line in LINES:
             flux = line.flux(self.geocorona)
             if flux and low <= line.wavelength <= high_:
-                rates[line.name] = passband.line_rate(PIXEL_AREA * flux, line.wavelength)
+                rates[line.name] = passband.line_rate(area * flux, line.wavelength)
         return rates
 
     def rate(self, channel: Channel, passband: Passband) -> float:
@@ -128,17 +129,18 @@ class PaperSky:
 
     def components(self, channel: Channel, passband: Passband) -> Mapping[str, float]:
         """Count rates in cps per pixel, by the component's name."""
-        sky = channel.sky
+        sky = _constants(channel)
         lines = continuum = 1.0
         if passband.filters:
-            unfiltered = Passband(passband.band, passband.cps_per_flux)
+            unfiltered = replace(passband, filters=())
             flux = _average_continuum()
             continuum = passband.continuum_rate(WAVELENGTH, flux)
             continuum /= unfiltered.continuum_rate(WAVELENGTH, flux)
             low, high = channel.band
             seen = [line for line in LINES if low <= line.wavelength <= high]
-            lines = sum(line.high * float(passband.transmission(line.wavelength)) for line in seen)
-            lines /= sum(line.high for line in seen)
+            lines = continuum
+            if seen:
+                lines = _strength(seen, passband) / _strength(seen, unfiltered)
         return {
             "geocorona": sky.geocorona * lines,
             "earthshine and zodiacal light": sky.earthshine_and_zodiacal * continuum,
@@ -147,30 +149,41 @@ class PaperSky:
     def rate(self, channel: Channel, passband: Passband) -> float:
         """Count rate of all components, cps per pixel; without filters the paper's constant."""
         if not passband.filters:
-            return channel.sky.total
+            return _constants(channel).total
         return sum(self.components(channel, passband).values())
 
 
 def paper_estimate(channel: Channel) -> dict[str, float]:
-    """Sky of a channel in the way that gives the paper's two numbers, cps per pixel.
+    """Sky of a channel of ISSIS in the way that gives the paper's numbers, cps per pixel.
 
     The paper does not say how it came by them. They follow within 3 % from average earthshine
     and zodiacal light taken at one wavelength, 1400 or 2500 A, and from the high fluxes of the
     geocoronal lines, each counted as a flux spread evenly over the band.
     """
     at = PAPER_WAVELENGTHS[channel.name] == WAVELENGTH
+    area = channel.pixel_scale**2
     low, high = channel.band
     lines = sum(line.high for line in LINES if low <= line.wavelength <= high) / (high - low)
     return {
-        "geocorona": lines * channel.cps_per_flux * PIXEL_AREA,
+        "geocorona": lines * channel.cps_per_flux * area,
         "earthshine and zodiacal light": (
-            float(_average_continuum()[at][0]) * channel.cps_per_flux * PIXEL_AREA
+            float(_average_continuum()[at][0]) * channel.cps_per_flux * area
         ),
     }
 
 
 def _average_continuum() -> Array:
     return EARTHSHINE["average"] * EARTHSHINE_HIGH + ZODIACAL["average"] * ZODIACAL_HIGH
+
+
+def _strength(lines: Iterable[Line], passband: Passband) -> float:
+    return sum(line.high * float(passband.relative_response(line.wavelength)) for line in lines)
+
+
+def _constants(channel: Channel) -> SkyConstants:
+    if channel.sky is None:
+        raise ValueError(f"channel {channel.name} has no constants of the sky; give a Sky.")
+    return channel.sky
 
 
 def _latitude(value: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -161,8 +162,8 @@ def _moments(spectrum: Spectrum, stamp: tuple[int, ...], passband: Passband) -> 
     knots = np.concatenate([pieces, spectrum.knots()])
     if spectrum.ebv > 0:
         knots = np.concatenate([knots, EXTINCTION_KNOTS])
-    flat = 0.5 * (high**2 - low**2)
-    without = Passband(passband.band, passband.cps_per_flux)
+    flat = passband.unfiltered_moment
+    without = replace(passband, filters=())
     mean = without.moment_of(spectrum, knots) / flat
     passed = passband.moment_of(spectrum, knots) / flat if passband.filters else mean
     return mean, passed

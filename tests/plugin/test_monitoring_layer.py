@@ -87,6 +87,25 @@ def test_frames_are_dropped_when_there_are_too_many(viewer, qtbot, monkeypatch):
         assert len(layer.data._kept) <= 2
 
 
+def test_all_frames_at_once(viewer, qtbot, monkeypatch, threads):
+    """Catches frames that are never asked for again, or that drive each other out for ever."""
+    sequence = plan(4)
+    layer = sequence.show(viewer)
+    expected = sequence.stack().compute()
+    qtbot.waitUntil(
+        lambda: np.array_equal(layer.data[0:4, 3:9, 5], expected[:, 3:9, 5]), timeout=PATIENCE
+    )
+    qtbot.waitUntil(lambda: not layer.data.busy, timeout=PATIENCE)
+    monkeypatch.setattr(frames_module, "MOST_BYTES", 1.0)
+    monkeypatch.setattr(frames_module, "AHEAD", 1)
+    crowded = sequence.show(viewer)
+    for _ in range(5):
+        part = crowded.data[:]
+        qtbot.waitUntil(lambda: not crowded.data.busy, timeout=PATIENCE)
+    assert np.array_equal(part[:2], expected[:2])
+    assert not part[2:].any()
+
+
 def test_the_whole_stack_for_whoever_saves_it(viewer, qtbot):
     """Catches blank frames in a file."""
     sequence = plan()

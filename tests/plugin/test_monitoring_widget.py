@@ -132,7 +132,7 @@ def test_wrong_values_are_told_and_nothing_starts(widget):
     widget.form.epochs.native.setEditText("20000")
     enter(widget.form.delays, "")
     click(widget, "stack")
-    assert "epochs is 20000" in told()[-1]
+    assert "20000 epochs of 2 exposures are 40000, more than 10000" in told()[-1]
     assert not widget.busy
 
 

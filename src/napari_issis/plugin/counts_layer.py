@@ -109,7 +109,7 @@ class CountsLayer:
         low, high = self._layer.contrast_limits
         return float(low), float(high)
 
-    def make(self, shape: tuple[int, int], picture: Picture | None) -> Image:
+    def make(self, shape: tuple[int, int], pixel_scale: float, picture: Picture | None) -> Image:
         """Create the layer, with the last picture if there is one."""
         self._picture = picture
         mark: dict[str, Any] = {"role": "counts"}
@@ -121,6 +121,7 @@ class CountsLayer:
             data,
             contrast_limits=self._limits or (0, 1),
             metadata={MARKER: mark},
+            scale=(pixel_scale, pixel_scale),
             **styles.COUNTS,
         )
         frame = layer.bounding_box

@@ -22,15 +22,19 @@ def exposure_layers(exposure: Exposure) -> list[LayerDataTuple]:
 
     The layers carry the mark by which a scene recognises and adopts them.
     """
-    sources, observation = master_table(exposure.sources), exposure.observation
+    observation = exposure.observation
+    sources = master_table(exposure.sources, observation.pixel_scale)
     point = np.asarray(sources["kind"], dtype=str) == "point"
     ids = np.arange(1, len(sources) + 1)
+    scale = (observation.pixel_scale, observation.pixel_scale)
     image = {
+        "scale": scale,
         **styles.COUNTS,
         "contrast_limits": contrast_limits(exposure.counts, exposure.background),
         "metadata": {MARKER: {"role": "counts", "exposure": exposure}},
     }
     ellipses = {
+        "scale": scale,
         **styles.ELLIPSES,
         "edge_width": styles.edge_width(observation.shape),
         "features": features(sources[~point], ids[~point]),
@@ -38,11 +42,12 @@ def exposure_layers(exposure: Exposure) -> list[LayerDataTuple]:
     }
     corners = list(shapes_data(sources[~point]))
     if corners:
-        ellipses["shape_type"] = "ellipse"
+        ellipses["shape_type"] = styles.shape_types(sources["kind"][~point])
         ellipses["edge_color"] = styles.edge_colors(sources["kind"][~point])
     else:
         ellipses["ndim"] = 2
     points = {
+        "scale": scale,
         **styles.POINTS,
         "size": styles.marker_size(observation.shape),
         "features": features(sources[point], ids[point]),

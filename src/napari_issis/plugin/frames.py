@@ -65,7 +65,9 @@ class Frames:
         if wanted.ndim == 0:
             frame: NDArray[Any] = self._frame(int(wanted))[tuple(rest)]
             return frame
-        frames = np.stack([self._frame(int(index)) for index in wanted])
+        # Of more than may be kept, the first: the others would drive each other out for ever.
+        seen = [self._frame(int(index)) for index in wanted[: self._most]]
+        frames = np.stack(seen + [self._blank] * (len(wanted) - len(seen)))
         return frames[(slice(None), *rest)]
 
     @property

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from html import escape
 from typing import Any
 
 from magicgui.widgets import CheckBox, ComboBox, PushButton
 from napari.utils.notifications import show_error
 from qtpy.QtWidgets import QFileDialog
 
-from ..detector import Detector
-from ..filter_set import FILTER_NAMES, FILTER_NOTE, ILLUSTRATIVE_FILTERS
 from ..filters import Filter
-from ..instrument import CHANNELS, FRAME_SIZES, PIXEL_SCALE
-from ..observation import Observation
+from ..instrument import Instrument
+from ..instruments import INSTRUMENTS, instrument_named
+from ..observation import Observation, passes
 from ..psf_blurs import with_blurs_of
 from ..sky import SKIES
 from .form import Form
@@ -26,6 +25,7 @@ from .scene import Scene
 # What the last entry of a wheel stands for.
 LOAD = "load"
 # Black on amber is readable in napari's dark and light themes.
+WARNING_NOTE = "The limits are those of HST ACS/SBC, the nearest analogue."
 WARNING_STYLE = "color: #111; background: #ffcf5c; padding: 3px; border-radius: 3px;"
 
 
@@ -42,13 +42,14 @@ class InstrumentForm(Form):
         super().__init__("Instrument")
         self.scene = scene
         self.channel = ComboBox(
-            choices=[(_channel_text(name), name) for name in CHANNELS],
+            choices=_channels(scene.observation),
             tooltip="Channel of the camera and its spectral range",
         )
-        wheel = (
-            "Filter wheels: open, a neutral filter that passes 0.1 (NF1) or 0.01 (NF2), "
-            "or a curve. " + FILTER_NOTE.replace("This filter is", "Those marked * are")
+        self.camera = ComboBox(
+            choices=_cameras(scene.observation),
+            tooltip="Camera: ISSIS, others for comparison, or one of your own from a TOML file",
         )
+        wheel = "Filter wheels: open, a neutral filter, or a curve. Those marked * are illustrative"
         self.wheel1 = ComboBox(choices=_filters(scene.observation), tooltip=wheel)
         self.wheel2 = ComboBox(choices=_filters(scene.observation), tooltip=wheel)
         self.exposure = NumberField(
@@ -58,7 +59,7 @@ class InstrumentForm(Form):
             check=lambda seconds: Observation(exposure=seconds),
         )
         self.frame = ComboBox(
-            choices=_frames((512, 512)),
+            choices=_frames(scene.observation),
             tooltip="Frame in pixels (and its width); the sources stay where they are",
         )
         self.position = PositionField()
@@ -71,7 +72,7 @@ class InstrumentForm(Form):
             "seed", scene.seed, "Seed of the Poisson noise of the picture; takes effect with Enter"
         )
         self.new_noise = PushButton(text="&New noise", tooltip="Draw the noise anew (next seed)")
-        self.add("&Channel", self.channel)
+        self.add("Camera, &channel", self.camera, self.channel)
         self.sky_model = ComboBox(
             choices=_skies(scene.observation),
             tooltip="Sky: the paper's constants (CIS), HST's levels, or that of a high orbit",
@@ -84,7 +85,8 @@ class InstrumentForm(Form):
         self.add("Sky", self.sky_model)
         self.loss = CheckBox(
             text="Coincidence loss",
-            tooltip="Photons lost in bright pixels to a dead time: 1 % at 22 cps as in ACS/SBC",
+            tooltip="Photons lost in bright pixels to the dead time of the camera's detector "
+            "(ISSIS: assumed as in ACS/SBC, 1 % at 22 cps)",
         )
         self.rollover = CheckBox(
             text="16-bit rollover",
@@ -93,8 +95,9 @@ class InstrumentForm(Form):
         self.add("Detector", self.loss, self.rollover)
         self.sky = self.add_text("Background with the filters in place, by parts")
         self.psf = PsfRows(self, scene)
-        self.warning = self.add_text("Limits of HST ACS/SBC, the nearest analogue")
+        self.warning = self.add_text(WARNING_NOTE)
         self.warning.setStyleSheet(WARNING_STYLE)
+        self._labelled: tuple[Any, ...] = ()
         self._shown: tuple[Any, ...] = (
             scene.observation.exposure,
             scene.seed,
@@ -104,6 +107,7 @@ class InstrumentForm(Form):
         self._position_text = ""
         self.show_observation()
         self.show_warnings()
+        self.camera.changed.connect(self._apply_camera)
         self.channel.changed.connect(self._apply_channel)
         self.sky_model.changed.connect(lambda sky: self._apply(sky=sky))
         for wheel_box in (self.wheel1, self.wheel2):
@@ -136,18 +140,25 @@ class InstrumentForm(Form):
     def show_observation(self, event: Any = None) -> None:
         """Show the scene's observation and seed."""
         observation = self.scene.observation
-        if set(self.frame.choices) != {shape for _, shape in _frames(observation.shape)}:
-            with self.frame.changed.blocked():
-                self.frame.choices = _frames(observation.shape)
+        camera = observation.instrument
+        # the labels depend on the camera too
+        if self._labelled != (camera, observation.channel, observation.shape):
+            self._labelled = (camera, observation.channel, observation.shape)
+            for widget, choices in (
+                (self.frame, _frames(observation)),
+                (self.channel, _channels(observation)),
+            ):
+                _offer(widget, choices)
         for widget, choices in (
+            (self.camera, _cameras(observation)),
             (self.wheel1, _filters(observation)),
             (self.wheel2, _filters(observation)),
             (self.sky_model, _skies(observation)),
         ):
             if tuple(widget.choices) != tuple(value for _, value in choices):
-                with widget.changed.blocked():
-                    widget.choices = choices
+                _offer(widget, choices)
         for widget, value in (
+            (self.camera, camera),
             (self.channel, observation.channel),
             (self.sky_model, observation.sky),
             (self.wheel1, observation.filters[0]),
@@ -185,8 +196,11 @@ class InstrumentForm(Form):
     def show_warnings(self, event: Any = None) -> None:
         """Show the count-rate limits that the present picture breaks."""
         picture = self.scene.picture
-        text = "\n".join(() if picture is None else picture.warnings)
+        text = "" if picture is None else picture.warning
         self.warning.setText(text)
+        if picture is not None:
+            lines = (*picture.warnings, WARNING_NOTE)
+            self.warning.setToolTip("".join(f"<p>{escape(line)}</p>" for line in lines))
         self.show_row(self.warning, bool(text))
 
     def _apply(self, **change: Any) -> None:
@@ -198,16 +212,32 @@ class InstrumentForm(Form):
             show_error(str(error))
         self.show_observation()
 
+    def _apply_camera(self, camera: Instrument | str) -> None:
+        """Change the camera; what it lacks of channel, filters and sky gives way to its own."""
+        if camera == LOAD:
+            path, camera = self.ask_camera_path(), self.scene.observation.instrument
+            try:
+                camera = camera if path is None else Instrument.read(path)
+            except (OSError, ValueError) as error:
+                show_error(str(error))
+        self._apply(instrument=camera)
+
     def _apply_channel(self, channel: str) -> None:
         """Change the channel; a filter that passes nothing of it is taken out of its wheel."""
+        observation = self.scene.observation
         filters = tuple(
-            one if _passes(channel, one) else "open" for one in self.scene.observation.filters
+            one if passes(observation.instrument, channel, one) else "open"
+            for one in observation.filters
         )
         self._apply(channel=channel, filters=filters)
 
     def _apply_loss(self, on: bool) -> None:
-        """Switch the dead time of the nearest analogue on, or any dead time off."""
-        dead_time = Detector.losing().dead_time if on else 0.0
+        """Switch the dead time of the camera on, or any dead time off."""
+        dead_time = self.scene.observation.channel_data.dead_time if on else 0.0
+        if dead_time is None:
+            show_error("The dead time of this camera's detector is not known: its file has none.")
+            self.show_observation()
+            return
         self._apply(detector=replace(self.scene.observation.detector, dead_time=dead_time))
 
     def _apply_filters(self, event: Any = None) -> None:
@@ -230,6 +260,12 @@ class InstrumentForm(Form):
         except (OSError, ValueError) as error:
             show_error(str(error))
             return None
+
+    def ask_camera_path(self) -> str | None:
+        """Ask for the file of a camera; None if the user changed his mind."""
+        kinds = "Cameras (*.toml);;All files (*)"
+        path, _ = QFileDialog.getOpenFileName(self, "Camera", "", kinds)
+        return path or None
 
     def ask_path(self) -> str | None:
         """Ask for the file of a filter; None if the user changed his mind."""
@@ -279,33 +315,43 @@ def _valid(field: NumberField) -> float | None:
         return None
 
 
-def _channel_text(name: str) -> str:
-    low, high = CHANNELS[name].band
-    return f"{name}  {low:.0f}–{high:.0f} Å"
+def _offer(widget: ComboBox, choices: list[tuple[str, Any]]) -> None:
+    """Put choices into a box in this order; what it held before would stay first."""
+    with widget.changed.blocked():
+        widget.choices = ()
+        widget.choices = choices
 
 
-def _frames(shape: tuple[int, int]) -> list[tuple[str, tuple[int, int]]]:
-    sizes = [(n, n) for n in FRAME_SIZES]
+def _cameras(observation: Observation) -> list[tuple[str, Any]]:
+    """Labels and values of the cameras that come with the program, and the one in use."""
+    cameras = [instrument_named(name) for name in INSTRUMENTS]
+    if observation.instrument not in cameras:
+        cameras.append(observation.instrument)
+    return [*((one.name, one) for one in cameras), ("load a file…", LOAD)]
+
+
+def _channels(observation: Observation) -> list[tuple[str, str]]:
+    return [
+        ("{}  {:.0f}–{:.0f} Å".format(name, *channel.band), name)
+        for name, channel in observation.instrument.channels.items()
+    ]
+
+
+def _frames(observation: Observation) -> list[tuple[str, tuple[int, int]]]:
+    shape, scale = observation.shape, observation.pixel_scale
+    sizes = [(n, n) for n in observation.channel_data.frame_sizes]
     if shape not in sizes:
         sizes.append(shape)
-    return [(f"{nx} × {ny} ({nx * PIXEL_SCALE:.1f}″)", (ny, nx)) for ny, nx in sizes]
-
-
-@lru_cache(maxsize=256)
-def _passes(channel: str, one: str | Filter) -> bool:
-    """Whether a filter passes light of a channel."""
-    try:
-        Observation(channel=channel, filters=(one, "open"))
-    except ValueError:
-        return False
-    return True
+    return [(f"{nx} × {ny} ({nx * scale:.1f}″)", (ny, nx)) for ny, nx in sizes]
 
 
 def _filters(observation: Observation) -> list[tuple[str, Any]]:
     """Labels and values of the filters that pass light of the channel, and those in use."""
-    names = [name for name in FILTER_NAMES if _passes(observation.channel, name)]
+    camera = observation.instrument
     filters: list[tuple[str, Any]] = [
-        (f"{name} *" if name in ILLUSTRATIVE_FILTERS else name, name) for name in names
+        (f"{name} *" if camera.is_illustrative(name) else name, name)
+        for name in camera.filter_names
+        if passes(camera, observation.channel, name)
     ]
     own = dict.fromkeys(one for one in observation.filters if isinstance(one, Filter))
     return [*filters, *((one.name, one) for one in own), ("load a curve…", LOAD)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..instrument import PIXEL_SCALE
+from ..sources import IMAGE
 
 ELLIPSE_COLORS = {
     "uniform": "cyan",
@@ -13,9 +13,10 @@ ELLIPSE_COLORS = {
     "exponential": "yellow",
     "devaucouleurs": "orange",
     "sersic": "magenta",
+    IMAGE: "dodgerblue",
 }
+# Beside the scale, which is the camera's.
 GEOMETRY: dict[str, Any] = {
-    "scale": (PIXEL_SCALE, PIXEL_SCALE),
     "units": ("arcsec", "arcsec"),
     "axis_labels": ("y", "x"),
 }
@@ -61,6 +62,11 @@ def edge_width(shape: tuple[int, int]) -> float:
 def marker_size(shape: tuple[int, int]) -> float:
     """Return the size of the markers in pixels of a frame of this shape."""
     return min(MARKER_WIDTH * max(shape) / CANVAS, WIDEST_MARKER)
+
+
+def shape_types(kinds: Iterable[str]) -> list[str]:
+    """Return how each kind is drawn: images as the rectangles that they are."""
+    return ["rectangle" if kind == IMAGE else "ellipse" for kind in kinds]
 
 
 def edge_colors(kinds: Iterable[str]) -> list[str]:

@@ -12,8 +12,8 @@ from .count_field import CountField
 from .form import Form
 from .number_field import NumberField, SeedField, read_number
 
-# More would be a stack that no slider goes through.
-MOST_EPOCHS, MOST_EXPOSURES = 10_000, 100
+# Exposures in all; more take minutes to plan, and much memory.
+MOST = 10_000
 
 
 class MonitoringForm(Form):
@@ -82,11 +82,17 @@ class MonitoringForm(Form):
 
     def settings(self) -> MonitoringSettings:
         """Return what the fields hold; a ValueError names the field that holds nothing valid."""
+        epochs, exposures = self.epochs.number, self.exposures.number
+        if epochs * exposures > MOST:
+            raise ValueError(
+                f"{epochs} epochs of {exposures} exposures are {epochs * exposures}, more than "
+                f"{MOST}; plan them in parts, or from a script."
+            )
         words = self.delays.value.replace(",", " ").split()
         return MonitoringSettings(
-            epochs=_at_most("epochs", self.epochs.number, MOST_EPOCHS),
+            epochs=epochs,
             cadence=self.cadence.number,
-            exposures=_at_most("exposures", self.exposures.number, MOST_EXPOSURES),
+            exposures=exposures,
             dither=self.dither.number,
             roll=self.roll.number,
             curve=self.curve.value,
@@ -99,9 +105,3 @@ class MonitoringForm(Form):
     def _show_rows(self, curve: str) -> None:
         for row in self._varying:
             self.show_row(row, curve != "constant")
-
-
-def _at_most(name: str, number: int, most: int) -> int:
-    if number > most:
-        raise ValueError(f"{name} is {number}; the widget takes {most} at most.")
-    return number

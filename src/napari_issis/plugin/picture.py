@@ -20,7 +20,7 @@ from ..exposure import (
     noise_ready_rate,
     same_table,
 )
-from ..limits import count_rate_warnings
+from ..limits import brief_warning, count_rate_warnings
 from ..observation import Observation
 
 Array = NDArray[np.float64]
@@ -35,10 +35,14 @@ PREVIEW_SHARE = 0.05
 
 @dataclass(frozen=True)
 class Picture:
-    """An exposure to show; ``final`` unless it is a preview during a drag."""
+    """An exposure to show; ``final`` unless it is a preview during a drag.
+
+    ``warning`` says briefly which count-rate limit is broken, ``warnings`` at length.
+    """
 
     exposure: Exposure
     warnings: tuple[str, ...] = ()
+    warning: str = ""
     final: bool = True
 
 
@@ -66,13 +70,11 @@ class PictureMaker:
     def final(self, sources: QTable, observation: Observation, seed: int) -> Picture:
         """Make the exposure that `napari_issis.simulate` makes of the same scene."""
         rate, clipped = self._rate(sources, observation)
+        sky = observation.background_rate
         return Picture(
             expose(rate, sources, observation, seed=seed, clipped=clipped),
-            tuple(
-                count_rate_warnings(
-                    rate, observation.background_rate, sources=sources, observation=observation
-                )
-            ),
+            tuple(count_rate_warnings(rate, sky, sources=sources, observation=observation)),
+            brief_warning(rate, sky, sources, observation),
         )
 
     def preview(

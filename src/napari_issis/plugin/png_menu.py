@@ -86,8 +86,14 @@ class PngMenu(QMenu):  # type: ignore[misc]
     def write_model(self, path: str) -> None:
         """Draw the sources, magnified as the final image is."""
         scene = self.scene
+        observation = scene.observation
         write_source_png(
-            path, scene.sources, scene.observation.shape, zoom=self._zoom, overwrite=True
+            path,
+            scene.sources,
+            observation.shape,
+            zoom=self._zoom,
+            overwrite=True,
+            pixel_scale=observation.pixel_scale,
         )
 
     def write_data(self, path: str) -> None:

@@ -11,7 +11,7 @@ from qtpy.QtGui import QShowEvent
 from qtpy.QtWidgets import QLabel, QToolButton
 
 from ..encircled_energy import psf_table
-from ..instrument import PSF_NOTE
+from ..observation import Observation
 from ..psf import PSF, RadialPSF, TelescopePSF
 from ..psf_blurs import BLURS, blurs_of, with_blurs
 from .form import Form
@@ -47,7 +47,6 @@ class PsfRows:
         self.text = QLabel()
         self.text.setWordWrap(True)
         self.text.setMinimumWidth(10)
-        self.text.setToolTip(PSF_NOTE)
         form.add_native(self.unfold, self.text)
         self.jitter = _field(
             "jitter_fwhm", "Jitter of the pointing: FWHM of a Gaussian blur, arcsec; 0 for none"
@@ -96,12 +95,13 @@ class PsfRows:
         observation = self.scene.observation
         blurs = blurs_of(observation)
         if observation.psf_assumed:
-            text = "assumed, about 0.10″ FWHM; none is published"
+            text = _assumed_text(observation)
         elif blurs:
             text = "assumed, with blurs and halo as edited"
         else:
             text = f"{type(observation.psf).__name__}, given by a script"
         self.text.setText(text)
+        self.text.setToolTip(observation.instrument.psf_note)
         psf = observation.effective_psf
         self.own.enabled = not observation.psf_assumed
         for field, name in zip(self._fields, BLURS, strict=True):
@@ -207,3 +207,9 @@ def _field(name: str, tooltip: str) -> NumberField:
         return TelescopePSF(1.7, **{**halo, name: number})
 
     return NumberField(name, 0.0, tooltip, check=check)
+
+
+def _assumed_text(observation: Observation) -> str:
+    if observation.instrument.name == "ISSIS":
+        return "assumed, about 0.10″ FWHM; none is published"
+    return f"assumed, of {observation.instrument.name}"

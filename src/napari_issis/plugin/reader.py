@@ -17,7 +17,6 @@ from ..catalogue import READABLE, read_catalogue
 from ..fits_image import DistortionWarning, read_image
 from ..fits_io import SUFFIXES, read_exposure
 from ..fits_table import open_fits
-from ..instrument import PIXEL_SCALE
 from ..observation import Observation
 from . import layer_styles as styles
 from .exposure_layers import adopt_layers, exposure_layers
@@ -71,7 +70,7 @@ def _image(path: str) -> list[LayerDataTuple]:
     to_frame = np.eye(3) if image.transform is None else image.transform
     options: dict[str, Any] = {
         "name": os.path.basename(path),
-        "affine": np.diag([PIXEL_SCALE, PIXEL_SCALE, 1.0]) @ to_frame,
+        "affine": np.diag([observation.pixel_scale, observation.pixel_scale, 1.0]) @ to_frame,
         "units": styles.GEOMETRY["units"],
         "axis_labels": styles.GEOMETRY["axis_labels"],
         "metadata": {"header": dict(image.header), "position": image.note},

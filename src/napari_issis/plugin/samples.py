@@ -50,7 +50,8 @@ def h1413() -> list[LayerDataTuple]:
 def scene_layers(name: str) -> list[LayerDataTuple]:
     """Image, ellipses and points of a built-in scene as napari layer data."""
     scene = example_scene(name)
-    sources, observation = master_table(scene.sources), scene.observation
+    observation = scene.observation
+    sources = master_table(scene.sources, observation.pixel_scale)
     rate, clipped = noise_ready_rate(sources, observation)
     return exposure_layers(expose(rate, sources, observation, clipped=clipped))
 

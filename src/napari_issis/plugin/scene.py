@@ -16,7 +16,6 @@ from qtpy.QtCore import QEventLoop, QTimer
 from qtpy.QtWidgets import QApplication
 
 from ..exposure import Exposure
-from ..instrument import PIXEL_SCALE
 from ..observation import Observation
 from ..source_rates import rates_per_flux
 from ..sources import source
@@ -173,13 +172,18 @@ class Scene:
             return
         # refused before anything has changed, if a source has no light in a new channel
         rates_per_flux(self.editor.sources, observation)
-        reframed = observation.shape != self._observation.shape
+        rescaled = observation.pixel_scale != self._observation.pixel_scale
+        reframed = rescaled or observation.shape != self._observation.shape
         self._observation = observation
         self.editor.observe(observation)
         if reframed:
             self._fit_marks()
             # a view that stays as it is shows the new frame at another zoom than the whole
             self._zoom_changed()
+        if rescaled and self.counts.layer is not None:
+            self.counts.layer.scale = (observation.pixel_scale, observation.pixel_scale)
+            if self._alone:
+                self.viewer.reset_view(layers=[self.counts.layer])
         self.counts.rescale(always=True)
         self._set_up += 1
         self._soon()
@@ -280,7 +284,7 @@ class Scene:
 
     def _checked(self, table: Table) -> QTable:
         """Master table of sources that all have a count rate in this observation."""
-        master = master_table(table)
+        master = master_table(table, self._observation.pixel_scale)
         rates_per_flux(master, self._observation)
         return master
 
@@ -427,7 +431,8 @@ class Scene:
         if new:
             self._orient()
         if self.counts.layer is None and all_layers:
-            image = self.counts.make(self._observation.shape, self._picture)
+            observation = self._observation
+            image = self.counts.make(observation.shape, observation.pixel_scale, self._picture)
             place = min((layers.index(above) for above in self.editor.layers), default=len(layers))
             layers.insert(place, image)
             self._bind_keys(image)
@@ -484,7 +489,7 @@ class Scene:
     def _fit_marks(self) -> None:
         with self.editor.quiet():
             for view in self.editor.views:
-                view.fit(self._observation.shape)
+                view.fit(self._observation.shape, self._observation.pixel_scale)
 
     def _zoom_changed(self, event: Any = None) -> None:
         self._zoomed.start()
@@ -506,7 +511,7 @@ class Scene:
             camera.orientation2d = ORIENTATION
         elif not self._told:
             self._told = True
-            text = f"The ISSIS layers are in arcsec ({PIXEL_SCALE} per pixel)"
+            text = f"The ISSIS layers are in arcsec ({self._observation.pixel_scale:g} per pixel)"
             if camera.orientation2d[0] == "down":
                 text += ", with row 0 drawn at the top because the viewer has other layers"
             show_info(f"{text}.")
@@ -668,7 +673,9 @@ def open_scene(
     ValueError
         If the source table has an error; no window is opened then.
     """
-    table = None if sources is None else master_table(sources)
+    known = None if viewer is None else scene_of(viewer)
+    given = observation or (Observation() if known is None else known.observation)
+    table = None if sources is None else master_table(sources, given.pixel_scale)
     if viewer is None:
         viewer = Viewer(title="napari-issis")
     # Widgets get a proxy of the viewer, which must not be mistaken for another one.

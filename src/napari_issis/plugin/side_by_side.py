@@ -8,6 +8,7 @@ import numpy as np
 from napari.layers import Image
 from napari.utils.events import EmitterGroup, Event
 
+from ..observation import Observation
 from . import layer_styles as styles
 from .marks import MARKER
 from .picking import activate, has_mouse, source_under
@@ -60,7 +61,7 @@ class SideBySide:
         self._before = {
             name: getattr(grid, name) for name in ("enabled", "stride", "shape", "spacing")
         }
-        self._frame = _empty_frame(self.scene.observation.shape)
+        self._frame = _empty_frame(self.scene.observation)
         self._busy = True
         selected = set(viewer.layers.selection)
         viewer.layers.insert(self._place(), self._frame)
@@ -122,10 +123,10 @@ class SideBySide:
             self._join()
 
     def _reframe(self, event: Any = None) -> None:
-        shape = self.scene.observation.shape
+        geometry = _geometry(self.scene.observation)
         assert self._frame is not None
-        if tuple(self._frame.scale) != _geometry(shape)["scale"]:
-            for name, value in _geometry(shape).items():
+        if tuple(self._frame.scale) != geometry["scale"]:
+            for name, value in geometry.items():
                 setattr(self._frame, name, value)
             self._fit()
 
@@ -143,23 +144,23 @@ class SideBySide:
                 activate(layers, found[0])
 
 
-def _empty_frame(shape: tuple[int, int]) -> Image:
+def _empty_frame(observation: Observation) -> Image:
     """Make a black layer of one pixel that covers the frame."""
     layer = Image(
         np.zeros((1, 1), np.uint8),
         name=FRAME_NAME,
         contrast_limits=(0, 1),
         metadata={MARKER: {"role": "frame"}},
-        **{**styles.GEOMETRY, **_geometry(shape)},
+        **{**styles.GEOMETRY, **_geometry(observation)},
     )
     border = layer.bounding_box
     border.visible, border.points, border.line_color = True, False, styles.FRAME_COLOR
     return layer
 
 
-def _geometry(shape: tuple[int, int]) -> dict[str, tuple[float, ...]]:
-    scale = styles.GEOMETRY["scale"]
+def _geometry(observation: Observation) -> dict[str, tuple[float, ...]]:
+    step = observation.pixel_scale
     return {
-        "scale": tuple(size * step for size, step in zip(shape, scale, strict=True)),
-        "translate": tuple((n - 1) / 2 * step for n, step in zip(shape, scale, strict=True)),
+        "scale": tuple(size * step for size in observation.shape),
+        "translate": tuple((n - 1) / 2 * step for n in observation.shape),
     }

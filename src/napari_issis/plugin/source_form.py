@@ -13,6 +13,7 @@ from qtpy.QtWidgets import QWidget
 
 from ..lensed_quasars import lensed_quasar
 from ..populations import CLUSTER_FLUX, random_sources, star_cluster
+from ..source_image import image_source
 from ..source_rates import cps_per_flux, flux_pivot
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -26,6 +27,7 @@ from .cluster_rows import ClusterRows
 from .count_field import CountField
 from .flux_rows import FluxRows
 from .form import Field, Form
+from .image_rows import ImageRows
 from .lens_rows import LensRows
 from .limit_fields import Limits, QuantityLimits
 from .number_field import NumberField, SeedField
@@ -46,6 +48,7 @@ MODES = (
     ("random distribution", "random"),
     ("star cluster", "cluster"),
     ("lensed quasar", "lens"),
+    ("image from a file", "image"),
 )
 FLUX_HELP = "Flux F, averaged over the channel, or AB magnitude"
 R_HELP = "Semi-major axis of the ellipse that holds half of the light (a pixel is 0.036″)"
@@ -104,7 +107,7 @@ class SourceForm(Form):
             choices=list(MODES),
             value="specific",
             tooltip="One source with these parameters, a random population over the frame, "
-            "the stars of a cluster, or a known lensed quasar",
+            "the stars of a cluster, a known lensed quasar, or an image as a source",
         )
         self.kind = ComboBox(
             choices=[(KIND_TEXT.get(kind, kind), kind) for kind in KINDS],
@@ -157,14 +160,15 @@ class SourceForm(Form):
         self.add("&Mode", self.mode)
         self._add_row("&Kind", self.kind, modes="specific random")
         self._add_row("Num&ber", self.number, modes="random cluster")
-        self._add_row("x, y (px)", self.x, self.y, modes="specific cluster lens")
-        self._flux_row = self._add_row("F", self.flux, modes="specific")
+        self._add_row("x, y (px)", self.x, self.y, modes="specific cluster lens image")
+        self._flux_row = self._add_row("F", self.flux, modes="specific image")
         self._r_row = self._add_row("R½", self.r_half, modes="specific", kinds=EXTENDED)
         self._add_row("Ellipticity", self.ellipticity, modes="specific", kinds=EXTENDED)
-        self._add_row("PA (°)", self.pa, modes="specific", kinds=EXTENDED)
+        self._add_row("PA (°)", self.pa, modes="specific image", kinds=EXTENDED)
         self._add_row("Sérsic n", self.n, modes="specific", kinds=SERSIC)
         self.cluster = ClusterRows(self)
         self.lens = LensRows(self)
+        self.image = ImageRows(self)
         self.fluxes = FluxRows(self, "uniform", (1e-15, 1e-14), _is("flux"))
         self.cluster_fluxes = FluxRows(self, "power", CLUSTER_FLUX, _is("flux"))
         self._r_limits_row = self._add_limits("R½", self.r_limits, EXTENDED)
@@ -258,6 +262,14 @@ class SourceForm(Form):
                 centre=(self.x.number, self.y.number),
                 **self.lens.options(),
             )
+        if self.mode.value == "image":
+            return image_source(
+                x=self.x.number,
+                y=self.y.number,
+                flux=self.flux.number,
+                pa=self.pa.number,
+                **self.image.options(),
+            )
         kind = self.kind.value
         ranges: dict[str, Any] = {}
         if kind != "point":
@@ -297,7 +309,7 @@ class SourceForm(Form):
         """Add the sources; an error is shown and changes nothing."""
         try:
             self.scene.add(self.table())
-        except ValueError as error:
+        except (OSError, ValueError) as error:
             show_error(str(error))
             return
         if self.mode.value in ("random", "cluster"):
@@ -328,9 +340,10 @@ class SourceForm(Form):
     def _show_fields(self, event: Any = None) -> None:
         mode, kind = self.mode.value, self.kind.value
         for row, modes, kinds in self._rows_where:
-            self.show_row(row, mode in modes and kind in kinds)
+            self.show_row(row, mode in modes and (kind in kinds or mode == "image"))
         self.cluster.show(mode == "cluster")
         self.lens.show(mode == "lens")
+        self.image.show(mode == "image")
         self.fluxes.show(mode == "random")
         self.cluster_fluxes.show(mode == "cluster")
         self._describe_drawn()

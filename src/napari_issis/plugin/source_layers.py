@@ -11,7 +11,7 @@ from astropy.table import QTable
 from napari.layers import Points, Shapes
 from numpy.typing import NDArray
 
-from ..instrument import PIXEL_SCALE
+from ..sources import IMAGE
 from . import layer_styles as styles
 from .layers import (
     FEATURES,
@@ -43,6 +43,7 @@ class SourceLayer:
     """
 
     role = ""
+    _scale = 1.0
 
     def __init__(self, layer: Any = None) -> None:
         self.layer = layer
@@ -55,9 +56,11 @@ class SourceLayer:
         self._geometry: Array = self.geometry(QTable(), empty=True)
         self._features = pd.DataFrame(columns=[*FEATURES, "source_id"])
 
-    def fit(self, shape: tuple[int, int]) -> None:
-        """Draw the marks so that they suit a frame of this shape."""
-        raise NotImplementedError
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
+        """Draw the marks so that they suit a frame of this shape and scale (arcsec per pixel)."""
+        self._scale = pixel_scale
+        if self.layer is not None:
+            self.layer.scale = (pixel_scale, pixel_scale)
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Tell which kinds of sources belong on the layer."""
@@ -123,15 +126,21 @@ class SourceLayer:
             return
         mine = self.holds(table["kind"])
         part, ids = table[mine], source_id[mine]
-        selected = set(self.current_ids()[list(self.layer.selected_data)])
-        self.replace(self.geometry(part), part)
         written = features(part, ids)
-        self.layer.features = written.copy()
         mark = {"role": self.role, "flux_unit": str(table["flux"].unit)}
         self.layer.metadata = {**self.layer.metadata, MARKER: mark}
-        self.layer.selected_data = {
-            int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
-        }
+        current = self.layer.features
+        if not (
+            len(current) == len(written)
+            and current.reindex(columns=written.columns).equals(written)
+            and self.shows(part)
+        ):
+            selected = set(self.current_ids()[list(self.layer.selected_data)])
+            self.replace(self.geometry(part), part)
+            self.layer.features = written.copy()
+            self.layer.selected_data = {
+                int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
+            }
         self._note(written, ids)
 
     def in_step(self, part: QTable, source_id: Ids) -> None:
@@ -227,8 +236,9 @@ class PointsLayer(SourceLayer):
     role = "points"
     _size = 9.0
 
-    def fit(self, shape: tuple[int, int]) -> None:
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
         """Give the markers a size that suits the frame."""
+        super().fit(shape, pixel_scale)
         self._size = styles.marker_size(shape)
         if self.layer is not None:
             self.layer.size = self._size
@@ -236,7 +246,8 @@ class PointsLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Points only."""
-        return np.asarray(kinds, dtype=np.str_) == "point"
+        held: NDArray[np.bool_] = np.asarray(kinds, dtype=np.str_) == "point"
+        return held
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Positions."""
@@ -261,6 +272,7 @@ class PointsLayer(SourceLayer):
             features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
             metadata={MARKER: {"role": self.role}},
             size=self._size,
+            scale=(self._scale, self._scale),
             **styles.POINTS,
         )
 
@@ -276,8 +288,9 @@ class EllipsesLayer(SourceLayer):
     role = "ellipses"
     _widest = _edge_width = 1.0
 
-    def fit(self, shape: tuple[int, int]) -> None:
+    def fit(self, shape: tuple[int, int], pixel_scale: float) -> None:
         """Make the edges thick enough to be seen, and no thicker, when the frame is."""
+        super().fit(shape, pixel_scale)
         self._widest = styles.edge_width(shape)
         self._set_width(self._widest)
 
@@ -286,7 +299,7 @@ class EllipsesLayer(SourceLayer):
 
         ``zoom`` is in pixels of the screen for an arcsec.
         """
-        self._set_width(min(self._widest, styles.EDGE / (zoom * PIXEL_SCALE)))
+        self._set_width(min(self._widest, styles.EDGE / (zoom * self._scale)))
 
     def _set_width(self, width: float) -> None:
         self._edge_width = width
@@ -296,7 +309,8 @@ class EllipsesLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """All but points."""
-        return np.asarray(kinds, dtype=np.str_) != "point"
+        held: NDArray[np.bool_] = np.asarray(kinds, dtype=np.str_) != "point"
+        return held
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Corners of the half-light isophotes."""
@@ -308,8 +322,12 @@ class EllipsesLayer(SourceLayer):
         return np.array(corners, dtype=np.float64) if len(corners) else np.empty((0, 4, 2))
 
     def foreign(self) -> list[int]:
-        """Other shapes than ellipses."""
-        return [row for row, kind in enumerate(self.layer.shape_type) if kind != "ellipse"]
+        """Other shapes than ellipses and the rectangles of images."""
+        other = [row for row, kind in enumerate(self.layer.shape_type) if kind != "ellipse"]
+        if not other or "kind" not in self.layer.features.columns:
+            return other
+        kinds = self.layer.features["kind"].to_numpy()
+        return [row for row in other if kinds[row] != IMAGE]
 
     def moved(self, table: QTable, written: Array, current: Array) -> QTable:
         """Return the table with the ellipses that changed."""
@@ -327,16 +345,21 @@ class EllipsesLayer(SourceLayer):
             features=features(QTable(_no_rows()), np.empty(0, dtype=np.int64)),
             metadata={MARKER: {"role": self.role}},
             edge_width=self._edge_width,
+            scale=(self._scale, self._scale),
             **styles.ELLIPSES,
         )
 
     def replace(self, data: Array, table: QTable) -> None:
-        """Put ellipses into the layer."""
+        """Put ellipses and images into the layer."""
         self.layer.selected_data = set()
-        self.layer.data = [(corners, "ellipse") for corners in data]
+        self.layer.data = list(zip(data, styles.shape_types(table["kind"]), strict=True))
         if len(data):
             self.layer.edge_color = styles.edge_colors(table["kind"])
             self.layer.edge_width = [self._edge_width] * len(data)
+
+    def shows(self, table: QTable) -> bool:
+        """Tell whether the layer shows these rows, each in its shape."""
+        return super().shows(table) and self.layer.shape_type == styles.shape_types(table["kind"])
 
     def recolor(self, kinds: Iterable[str]) -> None:
         """Give each ellipse the colour of its kind."""

@@ -32,6 +32,7 @@ from superqt.utils import qthrottled
 from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
 from .cell_editors import CellEditors
 from .list_forecast import ListForecast, with_forecast
+from .photometry_dialog import PhotometryDialog
 from .reader import tell_notes
 from .scene import open_scene
 from .source_columns import COLUMNS, from_text, to_text
@@ -104,6 +105,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             ("Delete", "Remove the selected sources (Del)", self.delete),
             ("&Import…", "Add a catalogue: ECSV, CSV, FITS, VOTable, DS9", self.load),
             ("Expor&t…", "Write the sources to a file: ECSV, CSV, FITS, VOTable", self.save),
+            ("&Photometry…", "Measure sources in apertures, beside the truth", self.photometry),
         ):
             button = QPushButton(label)
             button.setToolTip(tooltip)
@@ -125,6 +127,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             shortcut.activated.connect(action)
         self.view.selectionModel().selectionChanged.connect(self._rows_selected)
         self.model.refused.connect(self._tell_refused)
+        self._photometry: PhotometryDialog | None = None
         self._following = self._selecting = False
         self._soon = qthrottled(self.refresh, timeout=REST)
 
@@ -258,6 +261,13 @@ class SourceList(QWidget):  # type: ignore[misc]
         """Whether there is a forecast of the sources as they are now."""
         self.refresh()
         return self.forecast.on and not self.forecast.pending
+
+    def photometry(self) -> None:
+        """Open the dialog of aperture photometry."""
+        if self._photometry is None:
+            self._photometry = PhotometryDialog(self.scene, self)
+        self._photometry.show()
+        self._photometry.raise_()
 
     def _select_last(self, count: int) -> None:
         self.scene.editor.select(self.scene.editor.source_id[-count:].tolist())

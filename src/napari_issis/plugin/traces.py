@@ -164,7 +164,7 @@ class Traces:
         table.meta.update(
             {
                 along: trace.index,
-                "instrument": observation.instrument,
+                "instrument": observation.instrument.name,
                 "channel": observation.channel,
                 "filters": list(observation.filter_names),
                 "exposure": observation.exposure * u.s,

@@ -9,7 +9,7 @@ import numpy as np
 from napari.utils.events import EmitterGroup, Event
 from numpy.typing import ArrayLike, NDArray
 
-from ..instrument import PIXEL_SCALE
+from ..instruments import PIXEL_SCALE
 from ..photometry import ab_magnitude, flux_of_ab_magnitude
 from ..sources import BRIGHTEST
 

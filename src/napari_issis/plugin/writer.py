@@ -12,7 +12,6 @@ from napari.utils.transforms import Affine
 from ..exposure import Exposure
 from ..fits_header import layer_header
 from ..fits_io import SUFFIXES, write_exposure
-from ..instrument import PIXEL_SCALE
 from ..safe_write import replacing
 from .marks import MARKER
 from .scene import scene_of
@@ -92,7 +91,8 @@ def _header(meta: dict[str, Any]) -> fits.Header:
         shear=meta["shear"],
     )
     to_frame = np.asarray(meta["affine"]) @ own.affine_matrix
-    to_frame = np.diag([1 / PIXEL_SCALE, 1 / PIXEL_SCALE, 1.0]) @ to_frame
+    scale = scene.observation.pixel_scale
+    to_frame = np.diag([1 / scale, 1 / scale, 1.0]) @ to_frame
     return header + layer_header(to_frame, scene.observation)
 
 

@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sources import SourceArrays
+from ..sources import IMAGE, SourceArrays
 from .moving import highest_frequency, point_reach, profile_half_sizes
 from .optics import Optics, Transfer
 from .small_products import stack_product
@@ -45,8 +45,8 @@ class Derivatives:
         The overlap.
     images : ndarray, shape (3 or 6, ny, nx)
         Image of the source at a rate of 1 cps, which is the derivative by the rate, and the
-        derivatives of that image by x and y (per pixel); for extended sources by r_half (per
-        pixel), ellipticity and pa (per degree) too.
+        derivatives of that image by x and y (per pixel); for extended sources, images excepted,
+        by r_half (per pixel), ellipticity and pa (per degree) too.
     """
 
     window: Window
@@ -117,8 +117,8 @@ def derivatives(
         one = sources.take(slice(i, i + 1))
         tapers = _tapers(one, wing, float(level[i]), shape)
         if tapers is None:
-            window = slice(0, shape[0]), slice(0, shape[1])
-            result[i] = Derivatives(window, wide_images(optics, one, shape))
+            whole = slice(0, shape[0]), slice(0, shape[1])
+            result[i] = Derivatives(whole, wide_images(optics, one, shape))
             continue
         half = tuple(each.half for each in tapers)
         row, column = round(float(one.y[0])) - half[0], round(float(one.x[0])) - half[1]
@@ -153,7 +153,7 @@ def _tapers(
     if one.kind[0] == "point":
         return _Taper(wing), _Taper(wing)
     half_y, half_x = profile_half_sizes(one, level)
-    if one.kind[0] == "uniform":
+    if one.kind[0] in ("uniform", IMAGE):
         start_y, start_x = wing + half_y, wing + half_x
     else:
         start_y, start_x = np.hypot(wing, _coarse(half_y)), np.hypot(wing, _coarse(half_x))
@@ -205,7 +205,11 @@ def _cos_sin(angle: Array) -> tuple[Array, Array]:
 
 
 _NOTHING = np.zeros(1)
-_POINT = SourceArrays(np.array(["point"]), *([_NOTHING] * 7))
+_POINT = SourceArrays(
+    np.array(["point"]),
+    *(_NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING),
+    np.array([""]),
+)
 
 
 @lru_cache(maxsize=16)
@@ -283,8 +287,13 @@ def _phases(
     return end * phase, (end_slope - end * (2j * np.pi * k)) * phase
 
 
-def _transforms(one: SourceArrays, ky: Array, kx: Array) -> list[Array]:
-    """Transform of the profile and its derivatives by r_half, ellipticity and pa (degrees)."""
+def _transforms(one: SourceArrays, ky: Array, kx: Array) -> list[Transfer]:
+    """Transform of the profile and its derivatives by r_half, ellipticity and pa (degrees).
+
+    Of an image the size and the angle are known: the transform alone.
+    """
+    if one.kind[0] == IMAGE:
+        return [transform(one, ky, kx)]
     steps = {
         "r_half": STEP * float(one.r_half[0]),
         "ellipticity": STEP * (1 - float(one.ellipticity[0])),

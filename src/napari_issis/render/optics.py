@@ -14,6 +14,10 @@ Array = NDArray[np.float64]
 Transfer = NDArray[np.float64] | NDArray[np.complex128]
 
 
+# Cycles per pixel, those of a point of a hundredth of a pixel: finer meshes exceed the memory.
+HIGHEST = 100.0
+
+
 @dataclass(frozen=True)
 class Optics:
     """A PSF as the detector's pixels see it.
@@ -89,7 +93,15 @@ class Optics:
 
 @lru_cache(maxsize=256)
 def _band_limit(optics: Optics, threshold: float) -> float:
-    return optics.psf.band_limit(threshold) * optics.pixel_scale
+    limit = optics.psf.band_limit(threshold) * optics.pixel_scale
+    if limit > HIGHEST:
+        raise ValueError(
+            f"the PSF passes frequencies up to {limit:.3g} cycles per pixel: it is too sharp for "
+            f"pixels of {optics.pixel_scale:g} arcsec, and no more than {HIGHEST:g} can be "
+            "rendered; give it a blur (blur_fwhm of a TelescopePSF), a smaller aperture or a "
+            "larger width."
+        )
+    return limit
 
 
 @lru_cache(maxsize=256)
