@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sources import SourceArrays
+from ..sources import IMAGE, SourceArrays
 from . import _render, peaks
 from .optics import Optics
 
@@ -33,7 +33,7 @@ def wide_images(optics: Optics, one: SourceArrays, shape: tuple[int, int]) -> Ar
 
     Returns
     -------
-    ndarray, shape (6, ny, nx)
+    ndarray, shape (6, ny, nx), of an image source (3, ny, nx)
         On the whole frame.
     """
     rate = np.ones(1)
@@ -44,7 +44,9 @@ def wide_images(optics: Optics, one: SourceArrays, shape: tuple[int, int]) -> Ar
 
     scale = {"r_half": float(one.r_half[0]), "ellipticity": 1 - float(one.ellipticity[0])}
     images = [image(one)]
-    for name, share in STEPS.items():
+    # of an image the size and the angle are known
+    steps = list(STEPS.items())[: 2 if one.kind[0] == IMAGE else None]
+    for name, share in steps:
         value, step = getattr(one, name), share * scale.get(name, 1.0)
         ahead = image(replace(one, **{name: value + step}))
         images.append((ahead - image(replace(one, **{name: value - step}))) / (2 * step))
