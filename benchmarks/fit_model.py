@@ -1,7 +1,7 @@
 """A pixel model of stars and a galaxy under a Gaussian PSF, and maximum-likelihood fits of it.
 
 It shares nothing with the package: stars are error functions, the galaxy is a sum of Gaussians
-fitted to the de Vaucouleurs law, derivatives are those of the error function or differences.
+fitted to the de Vaucouleurs law, and derivatives are theirs, in closed form.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class PixelModel:
         for rate, x, y in parameters[:cut].reshape(-1, 3):
             total += rate * np.outer(self._along(y, 0)[0], self._along(x, 1)[0])
         if self.galaxy:
-            total += parameters[cut] * self._galaxy(*parameters[cut + 1 :])
+            total += parameters[cut] * self._galaxy(*parameters[cut + 1 :], slopes=False)[0]
         return total.ravel()
 
     def slopes(self, parameters: Array) -> Array:
@@ -65,12 +65,8 @@ class PixelModel:
             result += [rate * np.outer(slope_y, value_x)]
         if self.galaxy:
             rate, own = parameters[cut], parameters[cut + 1 :]
-            result.append(self._galaxy(*own))
-            for i, step in enumerate((1e-3, 1e-3, 1e-3 * own[2], 1e-4, 1e-2)):
-                shift = np.zeros(5)
-                shift[i] = step
-                change = self._galaxy(*(own + shift)) - self._galaxy(*(own - shift))
-                result.append(rate * change / (2 * step))
+            image, *slopes = self._galaxy(*own)
+            result += [image, *(rate * each for each in slopes)]
         return np.array([each.ravel() for each in result])
 
     def _along(self, centre: float, axis: int) -> tuple[Array, Array]:
@@ -80,20 +76,43 @@ class PixelModel:
         density = np.exp(-((edges / self.sigma) ** 2) / 2) / (np.sqrt(2 * np.pi) * self.sigma)
         return value, -np.diff(density)
 
-    def _galaxy(self, x: float, y: float, r_half: float, ellipticity: float, pa: float) -> Array:
-        """Image of a galaxy of rate 1; the pixel is a Gaussian of its variance, 1/12."""
+    def _galaxy(
+        self, x: float, y: float, r_half: float, ellipticity: float, pa: float, slopes: bool = True
+    ) -> list[Array]:
+        """Image of a galaxy of rate 1 and its derivatives by these parameters.
+
+        The pixel is a Gaussian of its variance, 1/12.
+        """
         dy = (np.arange(self.shape[0]) - y)[:, None]
         dx = (np.arange(self.shape[1]) - x)[None, :]
         sin, cos = np.sin(np.radians(pa)), np.cos(np.radians(pa))
-        along, across = (dy * cos - dx * sin) ** 2, (dy * sin + dx * cos) ** 2
-        blur = self.sigma**2 + 1 / 12
-        total = np.zeros(self.shape)
+        along, across = dy * cos - dx * sin, dy * sin + dx * cos
+        along2, across2 = along**2, across**2
+        blur, ratio = self.sigma**2 + 1 / 12, 1 - ellipticity
+        image, per_major, per_minor, by_size, by_ratio = np.zeros((5, *self.shape))
         for width, weight in zip(*_mixture(), strict=True):
-            major = (r_half * width) ** 2 + blur
-            minor = (r_half * (1 - ellipticity) * width) ** 2 + blur
+            major, minor = (r_half * width) ** 2 + blur, (r_half * ratio * width) ** 2 + blur
             height = weight / (2 * np.pi * np.sqrt(major * minor))
-            total += height * np.exp(-0.5 * (along / major + across / minor))
-        return total
+            one = height * np.exp(-0.5 * (along2 / major + across2 / minor))
+            image += one
+            if slopes:
+                per_major += one / major
+                per_minor += one / minor
+                by_major = one * (along2 / major - 1) / (2 * major)
+                by_minor = one * (across2 / minor - 1) / (2 * minor)
+                by_size += 2 * r_half * width**2 * (by_major + ratio**2 * by_minor)
+                by_ratio += 2 * r_half**2 * ratio * width**2 * by_minor
+        if not slopes:
+            return [image]
+        turn = along * across * (per_major - per_minor)
+        return [
+            image,
+            across * cos * per_minor - along * sin * per_major,
+            across * sin * per_minor + along * cos * per_major,
+            by_size,
+            -by_ratio,
+            np.radians(turn),
+        ]
 
 
 @lru_cache(maxsize=1)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from napari.utils.notifications import show_error, show_info
 from qtpy.QtCore import (
-    QAbstractItemModel,
     QItemSelection,
     QItemSelectionModel,
     QModelIndex,
@@ -18,14 +17,11 @@ from qtpy.QtWidgets import (
     QAbstractItemView,
     QApplication,
     QCheckBox,
-    QComboBox,
     QFileDialog,
     QHBoxLayout,
     QHeaderView,
     QLabel,
     QPushButton,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
     QTableView,
     QToolTip,
     QVBoxLayout,
@@ -34,7 +30,7 @@ from qtpy.QtWidgets import (
 from superqt.utils import qthrottled
 
 from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
-from ..sources import KINDS
+from .cell_editors import CellEditors
 from .list_forecast import ListForecast, with_forecast
 from .photometry_dialog import PhotometryDialog
 from .reader import tell_notes
@@ -45,7 +41,8 @@ from .source_model import ALL_COLUMNS, SourceModel
 # Milliseconds between two updates during a drag.
 REST = 100
 # Characters that the columns are wide enough for.
-WIDTHS = {"kind": 20, "flux": 18, "counts": 11, "spectrum": 30}
+WIDTHS = {"kind": 20, "flux": 18, "counts": 11, "spectrum": 30, "position_error_mas": 12}
+PLACES = {column.name: place for place, column in enumerate(ALL_COLUMNS)}
 TABLES = f"Source tables ({' '.join('*' + suffix for suffix in SUFFIXES)})"
 CATALOGUES = f"Catalogues ({' '.join('*' + suffix for suffix in READABLE)})"
 
@@ -69,7 +66,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         self.view.setToolTip(
             "The sources: click a heading to sort, double click a cell (or F2) to edit it"
         )
-        self.view.setItemDelegate(_Delegate(self.view))
+        self.view.setItemDelegate(CellEditors(self.view))
         self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.view.setSortingEnabled(True)
         self.view.setWordWrap(False)
@@ -87,6 +84,8 @@ class SourceList(QWidget):  # type: ignore[misc]
         for section, column in enumerate(ALL_COLUMNS):
             self.view.setColumnHidden(section, section >= len(COLUMNS))
             self.view.setColumnWidth(section, (WIDTHS.get(column.name, 9)) * character + 14)
+        # beside the other numbers
+        across.moveSection(PLACES["spectrum"], len(ALL_COLUMNS) - 1)
         self.count = QLabel()
         self.forecast_box = QCheckBox("&Forecast")
         self.forecast_box.setToolTip(
@@ -300,31 +299,6 @@ class SourceList(QWidget):  # type: ignore[misc]
             self.scene.units.events.changed.disconnect(self._sources_changed)
             self.forecast.pause()
         super().hideEvent(event)
-
-
-class _Delegate(QStyledItemDelegate):  # type: ignore[misc]
-    """Edits kinds with a list of choices, the rest as text."""
-
-    def createEditor(
-        self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
-    ) -> QWidget:
-        if ALL_COLUMNS[index.column()].name != "kind":
-            return super().createEditor(parent, option, index)
-        box = QComboBox(parent)
-        box.addItems(KINDS)
-        return box
-
-    def setEditorData(self, editor: QWidget, index: QModelIndex) -> None:
-        if isinstance(editor, QComboBox):
-            editor.setCurrentText(index.data(Qt.ItemDataRole.EditRole))
-        else:
-            super().setEditorData(editor, index)
-
-    def setModelData(self, editor: QWidget, model: QAbstractItemModel, index: QModelIndex) -> None:
-        if isinstance(editor, QComboBox):
-            model.setData(index, editor.currentText())
-        else:
-            super().setModelData(editor, model, index)
 
 
 def _count(sources: int, selected: int) -> str:
