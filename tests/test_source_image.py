@@ -254,11 +254,12 @@ def test_drag():
         assert np.abs(drag.rate - rate).max() <= 1e-6 * max(alone.max(), rate.max())
 
 
-def test_signal_to_noise():
+@pytest.mark.parametrize("pitch", [0.02, 0.6, 1.7])
+def test_signal_to_noise(pitch):
     """The noise-equivalent area is one over the sum of the squared shares of the pixels."""
-    source = placed(arcs(), 50, 50, 0.6, 20)
+    source = placed(arcs(), 50, 50, pitch, 20)
     wide = OBSERVATION.replace(shape=(101, 101))
-    share = image_rate(arcs(), 0.6, 50, 50, 20, wide.shape, SIGMA)
+    share = image_rate(arcs(), pitch, 50, 50, 20, wide.shape, SIGMA)
     counts = FLUX * wide.cps_per_flux * wide.exposure
     sky = wide.background_rate * wide.exposure
     expected = counts / np.sqrt(counts + sky / np.sum(share**2))

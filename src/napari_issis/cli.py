@@ -22,6 +22,7 @@ from .fits_header import psf_description
 from .fits_io import DTYPES, IMAGES
 from .fits_io import SUFFIXES as FITS_SUFFIXES
 from .frame_coordinates import read_position
+from .image_psf import ImagePSF
 from .instrument import CHANNELS, FILTERS
 from .observation import Observation
 from .png import SCALES, write_png, write_source_png
@@ -106,6 +107,13 @@ def _simulate(words: list[str]) -> None:
         help=f"filter in each wheel: {', '.join(FILTERS)}, or illustrative "
         f"{', '.join(ILLUSTRATIVE_FILTERS)}; default: the scene's, or open open",
     )
+    parser.add_argument("--psf", metavar="X.fits", help="PSF: the first image of this FITS file")
+    parser.add_argument(
+        "--psf-scale",
+        type=float,
+        metavar="ARCSEC",
+        help="spacing of that image's samples; default: what its header says",
+    )
     parser.add_argument("--sky", choices=SKIES, help="default: the scene's, or CIS")
     parser.add_argument(
         "--exposure", type=float, metavar="SECONDS", help="default: the scene's, or 100"
@@ -159,6 +167,10 @@ def _simulate(words: list[str]) -> None:
             changes[name] = getattr(options, name)
     if options.sky is not None:
         changes["sky"] = SKIES[options.sky]
+    if options.psf is not None:
+        changes["psf"] = ImagePSF.from_fits(options.psf, pixel_scale=options.psf_scale)
+    elif options.psf_scale is not None:
+        raise ValueError("--psf-scale is that of a PSF's image; give --psf too.")
     if options.frame is not None:
         frame = options.frame
         changes["shape"] = (frame[0], frame[0]) if len(frame) == 1 else tuple(frame)

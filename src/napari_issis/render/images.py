@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import fft, ndimage
 
 from ..source_image import SourceImage, kept_image
 from ..sources import IMAGE, SourceArrays
@@ -26,6 +26,8 @@ CUT = 7.5
 FAINTEST = 1e-14
 # frequencies are rounded up to multiples of this, so that painted images are shared
 LIMIT_STEP = 0.1
+# samples on a side, above which the transform at few frequencies is quicker than all of them
+LARGEST_PERIOD = 2500
 # pixels beyond which a PSF's wings do not change the noise
 PSF_REACH = 50.0
 
@@ -208,14 +210,24 @@ def inverse_noise_area(optics: Optics, one: SourceArrays) -> float:
 
 @lru_cache(maxsize=256)
 def _inverse_noise_area(optics: Optics, image: SourceImage, pitch: float, pa: float) -> float:
-    # the trapezoid rule is exact for light that ends within the period
-    period = pitch * 2 * image.half_diagonal + 2 * PSF_REACH
-    limit = min(optics.band_limit(1e-5), CUTOFF / pitch)
-    modes = int(limit * period)
-    ky, kx = np.arange(-modes, modes + 1) / period, np.arange(modes + 1) / period
-    squared = np.abs(optics.transfer(ky, kx) * _transform(image, pitch, pa, ky, kx)) ** 2
-    squared[:, 1:] *= 2
-    return float(squared.sum() / period**2)
+    # the trapezoid rule is exact for light that ends within the period, here in samples
+    period = int(
+        fft.next_fast_len(int(2 * image.half_diagonal + 2 * PSF_REACH / pitch) + 1, real=True)
+    )
+    modes = int(min(optics.band_limit(1e-5) * pitch, CUTOFF) * period)
+    y, x = np.arange(-modes, modes + 1), np.arange(modes + 1)
+    ky, kx = y / (period * pitch), x / (period * pitch)
+    if pa == 0 and period <= LARGEST_PERIOD:
+        power = np.abs(fft.fft2(image.weights, (period, period), workers=-1))[y % period]
+        power = power[:, x % period]
+        power *= np.exp(-2 * (np.pi * y / period) ** 2)[:, None]
+        power *= np.exp(-2 * (np.pi * x / period) ** 2)
+    else:
+        power = np.abs(_transform(image, pitch, pa, ky, kx))
+    power *= np.abs(optics.transfer(ky, kx))
+    power **= 2
+    power[:, 1:] *= 2
+    return float(power.sum() / (period * pitch) ** 2)
 
 
 @lru_cache(maxsize=8)
