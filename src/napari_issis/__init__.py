@@ -13,6 +13,7 @@ from .exposure_goal import exposure_for
 from .filters import Filter
 from .forecast import forecast
 from .image_psf import ImagePSF
+from .image_source import image_source
 from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
 from .limits import CountRateWarning
@@ -23,7 +24,7 @@ from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
 from .source_counts import expected_counts, signal_to_noise
-from .source_image import SourceImage, image_source
+from .source_image import SourceImage
 from .sources import source
 from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 

@@ -22,11 +22,12 @@ from .exposure import (
     same_table,
     simulate,
 )
+from .kept_images import kept_images
 from .light_curves import LightCurve, flux_factors
 from .limits import warn_of_count_rates
 from .moved_frame import move_frame
 from .observation import Observation
-from .source_image import SourceImage, kept_images
+from .source_image import SourceImage
 from .source_rates import sources_and_rates
 from .sources import FLUX_UNIT, check_sources
 

@@ -1,4 +1,4 @@
-"""Images as sources: each is a lattice of Gaussians (see `source_image`), scaled and turned."""
+"""Images as sources: each a lattice of Gaussians (see `SourceImage`), scaled and turned."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage
 
-from ..source_image import SourceImage, kept_image
+from ..kept_images import kept_image
+from ..source_image import SourceImage
 from ..sources import IMAGE, SourceArrays
 from .gaussians import Gaussians, ellipse, join
 from .optics import Optics
@@ -56,14 +57,16 @@ def image_gaussians(sources: SourceArrays, rate: Array, allowed: float) -> Gauss
     allowed : float
         Error allowed, cps per pixel: samples are left out that are fainter than a share of it.
     """
+    faintest = LEFT_OUT * allowed / len(sources)
     return join(
-        [_one(sources.take(slice(i, i + 1)), float(rate[i]), allowed) for i in range(len(sources))]
+        [_one(sources.take(slice(i, i + 1)), float(rate[i]), faintest) for i in range(len(sources))]
     )
 
 
-def _one(one: SourceArrays, rate: float, allowed: float) -> Gaussians:
+def _one(one: SourceArrays, rate: float, faintest: float) -> Gaussians:
+    """Gaussians of one image that are brighter than a surface brightness, cps per pixel."""
     image, pitch = image_of(one)
-    bright = np.abs(image.weights) * (rate / pitch**2) > LEFT_OUT * allowed
+    bright = np.abs(image.weights) * (rate / pitch**2) > faintest
     x, y = _positions(image, float(one.pa[0]))
     weight = image.weights[bright] * rate
     width = np.full(weight.shape, pitch)
