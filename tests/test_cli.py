@@ -12,7 +12,7 @@ import pytest
 from astropy.io import fits
 from PIL import Image
 
-from napari_issis import Exposure, Observation, Sky, simulate, source
+from napari_issis import Exposure, ImagePSF, Observation, Sky, simulate, source
 from napari_issis import cli as cli_module
 from napari_issis.catalogue import read_sources, write_sources
 from napari_issis.cli import main
@@ -362,4 +362,24 @@ def test_further_files(star, capsys):
     assert capsys.readouterr().out.count("wrote ") == 4
     again = ["simulate", star, "--output", "y.fits", "--rgba", "r.png"]
     assert "r.png exists already" in refused(capsys, *again)
+    assert not Path("y.fits").exists()
+
+
+def test_psf_of_a_file(star, capsys):
+    """Catches a PSF that is read and forgotten, and a scale that is not passed on."""
+    axis = np.arange(-20, 21)
+    array = np.exp(-0.5 * (axis[:, None] ** 2 + axis**2) / 9)
+    fits.PrimaryHDU(array).writeto("psf.fits")
+    arguments = ["simulate", star, *FRAME, "--psf", "psf.fits", "--output", "x.fits"]
+    assert "does not say its pixel scale" in refused(capsys, *arguments)
+    assert main([*arguments, "--psf-scale", "0.02"]) == 0
+    observation = Observation(shape=(40, 48), psf=ImagePSF(array, 0.02))
+    assert Exposure.read("x.fits") == simulate(read_sources(star), observation)
+    fits.PrimaryHDU(np.roll(array, 2, axis=1)).writeto("psf.fits", overwrite=True)
+    said = refused(capsys, *arguments, "--psf-scale", "0.02", "--overwrite")
+    assert "not centred" in said
+    assert "cut 4 columns off its left side" in said
+    assert "give --psf too" in refused(
+        capsys, "simulate", star, *FRAME, "--output", "y.fits", "--psf-scale", "0.02"
+    )
     assert not Path("y.fits").exists()

@@ -12,12 +12,13 @@ from astropy.table import vstack
 
 import napari_issis as ni
 from cardinal_images import exact_pixel, image_rate
+from napari_issis.image_source import NegativeLightWarning
 from napari_issis.instruments import PIXEL_SCALE
-from napari_issis.source_image import NegativeLightWarning, kept_image
+from napari_issis.kept_images import kept_image
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::napari_issis.CountRateWarning"),
-    pytest.mark.filterwarnings("ignore::napari_issis.source_image.NegativeLightWarning"),
+    pytest.mark.filterwarnings("ignore::napari_issis.image_source.NegativeLightWarning"),
 ]
 
 FWHM = 0.1
@@ -254,11 +255,12 @@ def test_drag():
         assert np.abs(drag.rate - rate).max() <= 1e-6 * max(alone.max(), rate.max())
 
 
-def test_signal_to_noise():
+@pytest.mark.parametrize("pitch", [0.02, 0.6, 1.7])
+def test_signal_to_noise(pitch):
     """The noise-equivalent area is one over the sum of the squared shares of the pixels."""
-    source = placed(arcs(), 50, 50, 0.6, 20)
+    source = placed(arcs(), 50, 50, pitch, 20)
     wide = OBSERVATION.replace(shape=(101, 101))
-    share = image_rate(arcs(), 0.6, 50, 50, 20, wide.shape, SIGMA)
+    share = image_rate(arcs(), pitch, 50, 50, 20, wide.shape, SIGMA)
     counts = FLUX * wide.cps_per_flux * wide.exposure
     sky = wide.background_rate * wide.exposure
     expected = counts / np.sqrt(counts + sky / np.sum(share**2))
@@ -367,7 +369,7 @@ def test_text_formats_name_the_file(tmp_path):
         printed = in_a_new_process(
             "import napari_issis as ni\n"
             f"read = ni.read_sources({str(table)!r})\n"
-            "from napari_issis.source_image import NegativeLightWarning, kept_image\n"
+            "from napari_issis.kept_images import kept_image\n"
             "print(repr(float(kept_image(str(read['image'][0])).array[3, 4])))"
         )
         assert float(printed) == (np.fliplr(arcs()) if mirrored else arcs())[3, 4]
@@ -471,7 +473,7 @@ def test_scenes_without_images_pay_nothing(monkeypatch):
     def looked_for(text):
         raise AssertionError(text)
 
-    monkeypatch.setattr("napari_issis.source_image.kept_image", looked_for)
+    monkeypatch.setattr("napari_issis.kept_images.kept_image", looked_for)
     monkeypatch.setattr("napari_issis.render.images.kept_image", looked_for)
     monkeypatch.setattr("napari_issis.render.image_gaussians", looked_for)
     table = vstack([ni.source("point", 10, 20), ni.source("sersic", 30, 30, n=2.0)])

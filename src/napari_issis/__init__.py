@@ -14,6 +14,7 @@ from .filters import Filter
 from .forecast import forecast
 from .host_arcs import host_arcs
 from .image_psf import ImagePSF
+from .image_source import image_source
 from .instrument import Instrument
 from .instruments import INSTRUMENTS
 from .lens_delays import isothermal_delays
@@ -30,7 +31,7 @@ from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
 from .source_counts import expected_counts, signal_to_noise
-from .source_image import SourceImage, image_source
+from .source_image import SourceImage
 from .sources import source
 from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 

@@ -17,10 +17,10 @@ from .ds9_regions import read_regions
 from .fits_io import SUFFIXES as FITS_SUFFIXES
 from .fits_source_images import image_hdus, keep_images
 from .fits_table import open_fits, read_table, table_hdu
+from .kept_images import check_in_files
 from .observation import Observation
 from .reading import one_line
 from .safe_write import replacing
-from .source_image import check_in_files
 from .sources import check_sources
 from .text_tables import read_text_table
 from .votable import SUFFIXES as VOTABLE_SUFFIXES

@@ -14,6 +14,7 @@ from .catalogue import read_catalogue
 from .exposure import Exposure, simulate
 from .fits_header import psf_description
 from .frame_coordinates import read_position
+from .image_psf import ImagePSF
 from .instrument import Instrument
 from .instruments import INSTRUMENTS, ISSIS, instrument_named
 from .observation import Observation
@@ -54,6 +55,13 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
         help=f"filter in each wheel, of ISSIS {', '.join(ISSIS.neutral_filters)}, or illustrative "
         f"{', '.join(ISSIS.filter_curves)}; default: the scene's, or open open",
     )
+    parser.add_argument("--psf", metavar="X.fits", help="PSF: the first image of this FITS file")
+    parser.add_argument(
+        "--psf-scale",
+        type=float,
+        metavar="ARCSEC",
+        help="spacing of that image's samples; default: what its header says",
+    )
     parser.add_argument("--sky", choices=SKIES, help="default: the scene's, or CIS")
     parser.add_argument(
         "--exposure", type=float, metavar="SECONDS", help="default: the scene's, or 100"
@@ -89,6 +97,10 @@ def read_scene(options: argparse.Namespace) -> tuple[QTable, Observation]:
             changes[name] = getattr(options, name)
     if options.sky is not None:
         changes["sky"] = SKIES[options.sky]
+    if options.psf is not None:
+        changes["psf"] = ImagePSF.from_fits(options.psf, pixel_scale=options.psf_scale)
+    elif options.psf_scale is not None:
+        raise ValueError("--psf-scale is that of a PSF's image; give --psf too.")
     if options.frame is not None:
         frame = options.frame
         changes["shape"] = (frame[0], frame[0]) if len(frame) == 1 else tuple(frame)

@@ -8,7 +8,8 @@ import numpy as np
 from astropy.io import fits
 from astropy.table import Table
 
-from .source_image import SourceImage, keep, kept_images
+from .kept_images import keep, kept_images
+from .source_image import SourceImage
 
 NAME = "LIGHT"
 _NUMBERED = re.compile(rf"{NAME}\d+")

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from .counts import checked_seed
 from .exposure import Exposure, simulate
+from .kept_images import kept_images
 from .light_curves import LightCurve, flux_factors
 from .monitoring_tasks import add_shifted, run, stack
 from .moved_frame import move_frame
 from .observation import Observation
-from .source_image import SourceImage, kept_images
+from .source_image import SourceImage
 from .source_rates import sources_and_rates
 from .sources import FLUX_UNIT, check_sources
 

@@ -12,9 +12,9 @@ from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
 from .instruments import PIXEL_SCALE
+from .kept_images import kept_image
 from .observation import Observation
 from .safe_write import replacing
-from .source_image import kept_image
 from .sources import IMAGE, check_sources
 
 SUFFIXES = (".png",)

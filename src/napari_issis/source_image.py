@@ -1,29 +1,14 @@
-"""An image as a source: a frame of another telescope or a model's arcs, between its samples too.
-
-A source table names an image by a text, ``path#digest`` or ``array#digest``; the digest is of
-the samples. The images themselves are kept here, for as long as the program runs, and in the
-FITS file of an exposure.
-"""
+"""An image that is a source's light, between its samples too."""
 
 from __future__ import annotations
 
 import hashlib
-import os
-import warnings
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-import astropy.units as u
 import numpy as np
-from astropy.table import QTable
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
-
-from .instruments import PIXEL_SCALE
-from .psf import positive
-from .sources import FLUX_UNIT, IMAGE, check_sources, image_texts
-from .spectra import Spectrum
 
 Array = NDArray[np.float64]
 
@@ -33,15 +18,6 @@ MOST_SAMPLES = 1024 * 1024
 MARGIN = 64
 DIGITS = 16
 ARRAY = "array"
-
-# Negative light of an image over all its light, beyond which one is warned.
-MOST_NEGATIVE = 0.01
-
-_kept: dict[str, SourceImage] = {}
-
-
-class NegativeLightWarning(UserWarning):
-    """An image has much negative light, of which no counts can be drawn."""
 
 
 class SourceImage:
@@ -64,11 +40,6 @@ class SourceImage:
     ------
     ValueError
         If it is not a finite image of two dimensions whose sum is positive, or is too large.
-
-    Warns
-    -----
-    NegativeLightWarning
-        If negative samples hold more than 1 % of the light.
 
     Notes
     -----
@@ -109,20 +80,16 @@ class SourceImage:
                 f"the image sums to {total}; the sum must be positive and finite. "
                 "Is its background subtracted too much?"
             )
-        negative = float(-samples[samples < 0].sum() / total)
-        if negative > MOST_NEGATIVE:
-            warnings.warn(
-                f"negative samples of the image hold {100 * negative:.2g} % of its light; where "
-                "the expected rate is below zero no counts are drawn, and the image gets brighter "
-                "by as much. Set noise around the source to 0 to avoid that.",
-                NegativeLightWarning,
-                stacklevel=2,
-            )
         samples.setflags(write=False)
         self.array = samples
         digest = hashlib.sha256(repr(samples.shape).encode() + samples.tobytes()).hexdigest()
         self.digest = digest[:DIGITS]
         self.text = f"{name}#{self.digest}"
+
+    @property
+    def negative_light(self) -> float:
+        """Light of the negative samples over that of all."""
+        return float(-self.array[self.array < 0].sum() / self.array.sum())
 
     @cached_property
     def r_half(self) -> float:
@@ -177,193 +144,9 @@ class SourceImage:
 
     def __reduce__(self) -> Any:
         # on a worker of a cluster it is found by its text as here
-        return _restored, (np.array(self.array), self.text)
+        from .kept_images import restored
 
-
-def image_source(
-    image: str | os.PathLike[str] | ArrayLike,
-    x: float,
-    y: float,
-    flux: Any,
-    *,
-    pixel_scale: float | None = None,
-    pa: Any = 0.0,
-    mirrored: bool = False,
-    hdu: int | str | None = None,
-    spectrum: str | Spectrum | None = None,
-) -> QTable:
-    """Make a source table of one row whose light is distributed as in an image.
-
-    Parameters
-    ----------
-    image : path-like or array_like, shape (ny, nx)
-        A FITS file, or surface brightness in any unit, ``[y, x]``; the sky subtracted. Samples
-        may be negative, their sum not.
-    x, y : float
-        Where the centre of the image comes to lie, pixels: the geometric centre of the array,
-        ((nx - 1) / 2, (ny - 1) / 2). The centre of the frame's first pixel is (0, 0).
-    flux : float or Quantity or Magnitude
-        Flux of the whole image in erg s-1 cm-2 A-1, or AB magnitude (with its unit).
-    pixel_scale : float, optional
-        Spacing of the samples, arcsec. By default that of the file's header: ``PIXELSCL`` or
-        ``PIXSCALE``, else its WCS.
-    pa : float or Quantity
-        Direction in the frame of the image's +y axis, degrees from the frame's +y
-        counter-clockwise towards -x.
-    mirrored : bool
-        Whether to exchange left and right first, as an image needs whose east is to the right.
-    hdu : int or str, optional
-        Number or name of the file's extension; by default the first with an image.
-    spectrum : str or Spectrum, optional
-        One spectrum for the whole image, as for `napari_issis.source`.
-
-    Returns
-    -------
-    astropy.table.QTable
-        Columns ``kind x y flux r_half ellipticity pa image`` (and ``spectrum``). ``r_half`` is
-        the radius of the circle about the image's centre that holds half of its light (see
-        `SourceImage.r_half`), in pixels of the frame: it is the image's size in the table, and
-        whoever changes it scales the image. The ellipticity is 0.
-
-    Raises
-    ------
-    ValueError
-        If the image or a value is not valid, or no pixel scale is given or found; the message
-        names it.
-    OSError
-        If the file cannot be opened.
-
-    Notes
-    -----
-    How the image is interpolated: see `SourceImage`. The interpolated image is convolved with
-    the PSF and the pixel like any other source.
-    """
-    if isinstance(image, str | os.PathLike):
-        from .fits_image import read_image
-        from .fits_pixel_scale import stated_pixel_scale
-
-        read = read_image(image, hdu=hdu)
-        samples: Any = read.data
-        name = str(Path(image).resolve())
-        if pixel_scale is None:
-            try:
-                pixel_scale = stated_pixel_scale(read.header)
-            except ValueError as error:
-                raise ValueError(f"{image}: {error}") from None
-        if pixel_scale is None:
-            raise ValueError(
-                f"{image} does not say its pixel scale (PIXELSCL or a WCS in angles); "
-                "give pixel_scale in arcsec."
-            )
-    else:
-        samples, name = image, ARRAY
-        if pixel_scale is None:
-            raise ValueError("an array has no pixel scale; give pixel_scale in arcsec.")
-        if hdu is not None:
-            raise ValueError(f"hdu is {hdu!r}, but an array has no extensions.")
-    scale = positive("pixel_scale", pixel_scale, "arcsec per pixel")
-    light = SourceImage(np.fliplr(samples) if mirrored else samples, name)
-    columns: dict[str, Any] = {
-        "kind": np.array([IMAGE], dtype="U13"),
-        "x": [x],
-        "y": [y],
-        "flux": np.atleast_1d(flux if hasattr(flux, "unit") else flux * FLUX_UNIT),
-        "r_half": [light.r_half * scale / PIXEL_SCALE] * u.pix,
-        "ellipticity": [0.0],
-        "pa": np.atleast_1d(pa if hasattr(pa, "unit") else pa * u.deg),
-        "image": [keep(light)],
-    }
-    if spectrum is not None:
-        columns["spectrum"] = [str(spectrum)]
-    table = QTable(columns)
-    check_sources(table)
-    return table
-
-
-def keep(image: SourceImage) -> str:
-    """Keep an image so that source tables can name it, and return its text."""
-    _kept.setdefault(image.digest, image)
-    return image.text
-
-
-def kept_image(text: str) -> SourceImage:
-    """Return the image that a text of a source table names.
-
-    One that is not kept is looked for in the file that the text names.
-
-    Raises
-    ------
-    ValueError
-        If there is none; the message says what to do.
-    """
-    name, mark, digest = text.rpartition("#")
-    if not mark or not name:
-        raise ValueError(
-            f"{text!r} names no image; make the source with napari_issis.image_source."
-        )
-    if digest not in _kept and name != ARRAY:
-        found = _found(Path(name), digest)
-        if found is not None:
-            keep(found)
-    if digest not in _kept:
-        where = "" if name == ARRAY else f", and {name} holds no image with that digest"
-        raise ValueError(
-            f"the image {text!r} is not loaded{where}; load it with napari_issis.image_source, "
-            "or open the FITS file of an exposure, which holds its images."
-        )
-    return _kept[digest]
-
-
-def kept_images(table: Any) -> dict[str, SourceImage]:
-    """Return the images that a source table names, by their texts, in the order of the rows."""
-    texts = image_texts(table)
-    if texts is None:
-        return {}
-    imaged = [str(kind).strip() == IMAGE for kind in table["kind"]]
-    return {text: kept_image(text) for text in dict.fromkeys(texts[imaged].tolist())}
-
-
-def check_in_files(table: Any) -> None:
-    """Raise a ValueError if an image of a source table cannot be read again from a file."""
-    texts = image_texts(table)
-    for text, image in kept_images(table).items():
-        name = text.rpartition("#")[0]
-        if name == ARRAY or not _found(Path(name), image.digest):
-            assert texts is not None
-            row = int(np.argmax(texts == text))
-            lies = "was an array" if name == ARRAY else f"is no longer in {name}"
-            raise ValueError(
-                f"row {row}, image: the image {lies}, and this format holds no images; "
-                "write the table, or an exposure of it, as FITS."
-            )
-
-
-def _found(path: Path, digest: str) -> SourceImage | None:
-    """Image of a file that has a digest, mirrored or not, if there is one."""
-    from .fits_image import read_image
-    from .fits_table import open_fits
-
-    try:
-        with open_fits(path) as hdus:
-            numbers = [i for i, hdu in enumerate(hdus) if hdu.is_image and len(hdu.shape) >= 2]
-        for number in numbers:
-            samples = read_image(path, hdu=number).data
-            # an image that cannot be a source is not the one
-            if samples.size > MOST_SAMPLES or not np.isfinite(samples).all() or samples.sum() <= 0:
-                continue
-            for one in (samples, np.fliplr(samples)):
-                light = SourceImage(one, str(path))
-                if light.digest == digest:
-                    return light
-    except (OSError, ValueError):
-        pass
-    return None
-
-
-def _restored(array: Array, text: str) -> SourceImage:
-    image = SourceImage(array, text.rpartition("#")[0])
-    keep(image)
-    return _kept[image.digest]
+        return restored, (np.array(self.array), self.text)
 
 
 def _gaussian_series(period: int) -> Array:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 SpectraOfRows = list[tuple[Spectrum, NDArray[np.intp]]]
 
 KINDS = ("point", "uniform", "gaussian", "exponential", "devaucouleurs", "sersic")
-# The kind whose profile is an image, see `source_image`; it has no default and no random values.
+# The kind whose profile is an image, see `image_source`; it has no default.
 IMAGE = "image"
 FLUX_UNIT = u.erg / u.s / u.cm**2 / u.AA
 COLUMNS = ("kind", "x", "y", "flux", "r_half", "ellipticity", "pa")
@@ -234,7 +234,7 @@ def _images(table: Table, used: NDArray[np.bool_], ellipticity: Array) -> NDArra
     """Texts of the images that a table names, each of which is there."""
     if not used.any():
         return np.zeros(len(table), dtype="U1")
-    from .source_image import kept_image
+    from .kept_images import kept_image
 
     texts = image_texts(table)
     if texts is None:

@@ -15,7 +15,7 @@ from astropy import units as u
 from astropy.table import QTable
 from numpy.typing import NDArray
 
-from ..source_image import kept_image
+from ..kept_images import kept_image
 from ..sources import IMAGE, SourceArrays, check_sources
 from .table import TEXTS, put
 

@@ -11,9 +11,9 @@ from magicgui.widgets import ComboBox, PushButton
 from napari.utils.notifications import show_error
 from qtpy.QtWidgets import QWidget
 
+from ..image_source import image_source
 from ..lensed_quasars import lensed_quasar
 from ..populations import CLUSTER_FLUX, random_sources, star_cluster
-from ..source_image import image_source
 from ..source_rates import cps_per_flux, flux_pivot
 from ..sources import (
     DEFAULT_ELLIPTICITY,

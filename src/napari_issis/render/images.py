@@ -1,4 +1,4 @@
-"""Images as sources: each is a lattice of Gaussians (see `source_image`), scaled and turned."""
+"""Images as sources: each a lattice of Gaussians (see `SourceImage`), scaled and turned."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import fft, ndimage
 
-from ..source_image import SourceImage, kept_image
+from ..kept_images import kept_image
+from ..source_image import SourceImage
 from ..sources import IMAGE, SourceArrays
 from .gaussians import Gaussians, ellipse, join
 from .optics import Optics
@@ -26,6 +27,8 @@ CUT = 7.5
 FAINTEST = 1e-14
 # frequencies are rounded up to multiples of this, so that painted images are shared
 LIMIT_STEP = 0.1
+# samples on a side, above which the transform at few frequencies is quicker than all of them
+LARGEST_PERIOD = 2500
 # pixels beyond which a PSF's wings do not change the noise
 PSF_REACH = 50.0
 
@@ -54,14 +57,16 @@ def image_gaussians(sources: SourceArrays, rate: Array, allowed: float) -> Gauss
     allowed : float
         Error allowed, cps per pixel: samples are left out that are fainter than a share of it.
     """
+    faintest = LEFT_OUT * allowed / len(sources)
     return join(
-        [_one(sources.take(slice(i, i + 1)), float(rate[i]), allowed) for i in range(len(sources))]
+        [_one(sources.take(slice(i, i + 1)), float(rate[i]), faintest) for i in range(len(sources))]
     )
 
 
-def _one(one: SourceArrays, rate: float, allowed: float) -> Gaussians:
+def _one(one: SourceArrays, rate: float, faintest: float) -> Gaussians:
+    """Gaussians of one image that are brighter than a surface brightness, cps per pixel."""
     image, pitch = image_of(one)
-    bright = np.abs(image.weights) * (rate / pitch**2) > LEFT_OUT * allowed
+    bright = np.abs(image.weights) * (rate / pitch**2) > faintest
     x, y = _positions(image, float(one.pa[0]))
     weight = image.weights[bright] * rate
     width = np.full(weight.shape, pitch)
@@ -208,14 +213,24 @@ def inverse_noise_area(optics: Optics, one: SourceArrays) -> float:
 
 @lru_cache(maxsize=256)
 def _inverse_noise_area(optics: Optics, image: SourceImage, pitch: float, pa: float) -> float:
-    # the trapezoid rule is exact for light that ends within the period
-    period = pitch * 2 * image.half_diagonal + 2 * PSF_REACH
-    limit = min(optics.band_limit(1e-5), CUTOFF / pitch)
-    modes = int(limit * period)
-    ky, kx = np.arange(-modes, modes + 1) / period, np.arange(modes + 1) / period
-    squared = np.abs(optics.transfer(ky, kx) * _transform(image, pitch, pa, ky, kx)) ** 2
-    squared[:, 1:] *= 2
-    return float(squared.sum() / period**2)
+    # the trapezoid rule is exact for light that ends within the period, here in samples
+    period = int(
+        fft.next_fast_len(int(2 * image.half_diagonal + 2 * PSF_REACH / pitch) + 1, real=True)
+    )
+    modes = int(min(optics.band_limit(1e-5) * pitch, CUTOFF) * period)
+    y, x = np.arange(-modes, modes + 1), np.arange(modes + 1)
+    ky, kx = y / (period * pitch), x / (period * pitch)
+    if pa == 0 and period <= LARGEST_PERIOD:
+        power = np.abs(fft.fft2(image.weights, (period, period), workers=-1))[y % period]
+        power = power[:, x % period]
+        power *= np.exp(-2 * (np.pi * y / period) ** 2)[:, None]
+        power *= np.exp(-2 * (np.pi * x / period) ** 2)
+    else:
+        power = np.abs(_transform(image, pitch, pa, ky, kx))
+    power *= np.abs(optics.transfer(ky, kx))
+    power **= 2
+    power[:, 1:] *= 2
+    return float(power.sum() / (period * pitch) ** 2)
 
 
 @lru_cache(maxsize=8)
