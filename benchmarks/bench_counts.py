@@ -45,6 +45,11 @@ def main() -> None:
         lambda: poisson_counts(after, 0), lambda: poisson_counts(after, 0, previous=previous)
     )
     print(f"30 x 30 pixels of 512 x 512 changed: {part:.2f} ms, all of them again {whole:.2f} ms")
+    bright = np.full((512, 512), 1e3)
+    ideal, dead = best(
+        lambda: poisson_counts(bright, 0), lambda: poisson_counts(bright, 0, dead_share=4.6e-6)
+    )
+    print(f"a dead time of 4.6e-6 exposures at 1000 counts: {dead:.1f} ms, none {ideal:.1f} ms")
     for n in (512, 2048):
         (fresh,) = best(partial(_fresh_uniforms, n), runs=2)
         print(f"uniforms and normals of a new seed, {n} x {n}: {fresh:.1f} ms")

@@ -21,11 +21,16 @@ os.environ["NAPARI_CONFIG"] = ""
 
 import napari
 import numpy as np
+from napari.utils.interactions import (
+    mouse_move_callbacks,
+    mouse_press_callbacks,
+    mouse_release_callbacks,
+)
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QApplication
 
 import napari_issis as ni
-from live_drag import mouse_move_callbacks, mouse_press_callbacks, mouse_release_callbacks, send
+from live_drag import send
 from napari_issis.plugin.dock import SimulatorWidget
 from napari_issis.plugin.scene import Scene, open_scene
 from napari_issis.plugin.source_list import SourceList

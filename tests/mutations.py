@@ -87,6 +87,13 @@ def corpus(folder: Path) -> dict[str, bytes]:
     for i, image in enumerate(images):
         fits.HDUList([fits.PrimaryHDU(), image]).writeto(folder / f"image{i}.fits")
         keep(f"image{i}.fits")
+    star, spectra = folder / "star.csv", SOURCES.copy()
+    star.write_text("wavelength_A,flux\n1800,1\n2500,3\n3300,2\n")
+    spectra["spectrum"] = ["flat", f'table("{star}")', f'table("{star}", z=0.1, at=2600)']
+    Exposure(counts, counts + 0.5, spectra, FRAME, 7).write(folder / "exposure-spectra.fits")
+    files["exposure-spectra.fits"] = without_checksums(folder / "exposure-spectra.fits")
+    star.unlink()
+    (folder / "exposure-spectra.fits").unlink()
     (folder / "exposure.fits").unlink()
     (folder / "compressed.fits").unlink()
     files["image.fits.gz"] = gzip.compress(files["image3.fits"])

@@ -188,6 +188,16 @@ def test_the_correction_is_the_encircled_energy():
     assert 1 / row["aperture_correction"] == pytest.approx(share, rel=1e-3)
 
 
+def test_a_source_that_is_an_image():
+    """Catches a kind that apertures do not know: alone it has no bias."""
+    y, x = np.mgrid[-9:10, -9:10]
+    blob = ni.image_source(np.exp(-(x**2 + y**2) / 18.0), 30, 28, flux=2e-16, pixel_scale=0.036)
+    exposure = ni.simulate(blob, observation(exposure=1e6))
+    (row,) = ni.aperture_photometry(exposure)
+    assert 1 < row["aperture_correction"] < 1.3
+    assert abs(row["bias_percent"]) < 1e-3
+
+
 def test_sources_at_the_edge_outside_and_without_flux():
     """Catches NaN, and rows that are lost."""
     scene = vstack(

@@ -152,6 +152,7 @@ SET_UPS = {
         psf=ni.MoffatPSF(0.11, 3.1),
         sky=ni.SKIES["HST high"],
     ),
+    "camera": ni.Observation(instrument="ACS/SBC", shape=(48, 64), exposure=500.0),
     "background": ONE.replace(background=0.0123, psf=ni.GaussianPSF(0.08)),
 }
 
@@ -163,6 +164,7 @@ SET_UPS = {
         ("everything", STRANGE),
         ("curve", SCENE),
         ("background", SCENE),
+        ("camera", SCENE),
         ("plain", SCENE[:0]),
     ],
 )
@@ -188,6 +190,23 @@ def test_what_cannot_be_written_is_read_from_the_saved_exposure(tmp_path, monkey
     page = sheet(tmp_path / "x.html", SCENE, one)
     assert any("is read from" in text or "NUV.fits" in text for text in page.texts)
     exposure = ni.simulate(SCENE, one)
+    exposure.write("NUV.fits")
+    made = {}
+    exec(compile(page.code, "<sheet>", "exec"), made)
+    assert np.array_equal(made["exposures"][0].counts, exposure.counts)
+
+
+def test_a_source_that_is_an_image_is_read_from_the_saved_exposure(tmp_path, monkeypatch):
+    """Catches a page that cannot be made, and commands that lose the image."""
+    y, x = np.mgrid[-9:10, -9:10]
+    arc = ni.image_source(
+        np.exp(-((np.hypot(x, y) - 5) ** 2)), 30, 22, flux=2e-16, pixel_scale=0.036
+    )
+    scene = vstack([SCENE, arc])
+    monkeypatch.chdir(tmp_path)
+    page = sheet(tmp_path / "x.html", scene)
+    assert "NUV.fits" in " ".join(page.texts)
+    exposure = ni.simulate(scene, ONE)
     exposure.write("NUV.fits")
     made = {}
     exec(compile(page.code, "<sheet>", "exec"), made)

@@ -8,14 +8,14 @@ from typing import Any
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable
+from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .exposure import Exposure
 from .observation import Observation
 from .render import count_rate
 from .source_rates import sources_and_rates
-from .sources import SourceArrays, source
+from .sources import SourceArrays
 
 Array = NDArray[np.float64]
 
@@ -116,12 +116,8 @@ def aperture_photometry(
             f"{LARGEST:g} can be. Choose a smaller scale or annulus, or leave it out by rows."
         )
     area, complete = _areas(apertures, observation.shape)
-    share = np.array(
-        [
-            own_share(arrays.take(slice(i, i + 1)), size, scale, observation)
-            for i in range(len(area))
-        ]
-    )
+    shares = [own_share(exposure.sources[i : i + 1], size, scale, observation) for i in chosen]
+    share = np.array(shares)
 
     def measured(image: Array) -> tuple[Array, Array, Array]:
         level, error = np.full(len(area), exposure.background), np.zeros(len(area))
@@ -173,33 +169,34 @@ def aperture_photometry(
     )
 
 
-def own_share(one: SourceArrays, radius: float, scale: float, observation: Observation) -> float:
+def own_share(one: Table, radius: float, scale: float, observation: Observation) -> float:
     """Share of a source's light that its aperture holds, on pixels, without noise.
 
     Parameters
     ----------
-    one : SourceArrays
-        The source, of length 1; its place within its pixel counts.
+    one : astropy.table.Table
+        A source table of one row; the source's place within its pixel counts.
     radius, scale : float
         The aperture, see `aperture_photometry`; ``radius`` in pixels.
     observation : Observation
         The instrument set-up.
     """
-    apertures = _apertures(one, radius, scale)
+    arrays, _ = sources_and_rates(one, observation)
+    apertures = _apertures(arrays, radius, scale)
     half = int(np.ceil(apertures.a[0])) + 1
-    x, y = (half + float(v - np.rint(v)) for v in (one.x[0], one.y[0]))
-    flux, kind = 1e-15, str(one.kind[0])
-    shape = {"r_half": one.r_half[0], "ellipticity": one.ellipticity[0], "pa": one.pa[0]}
-    if kind == "sersic":
-        shape["n"] = one.index[0]
+    x, y = (half + v - np.rint(v) for v in (arrays.x, arrays.y))
+    flux = 1e-15
+    alone = Table(one)
+    # with a flat spectrum and open filters, whose rate is known
+    alone.keep_columns([name for name in alone.colnames if name != "spectrum"])
+    alone["x"], alone["y"], alone["flux"] = x, y, np.array([flux])
     frame = observation.replace(
         shape=(2 * half + 1, 2 * half + 1),
         filters=("open", "open"),
         psf=observation.effective_psf,
     )
-    image = count_rate(source(kind, x, y, flux, **shape), frame)
-    centred = replace(apertures, x=np.array([x]), y=np.array([y]))
-    return float(_sums(image, centred)[0] / (flux * frame.cps_per_flux))
+    sums = _sums(count_rate(alone, frame), replace(apertures, x=x, y=y))
+    return float(sums[0] / (flux * frame.cps_per_flux))
 
 
 def _apertures(arrays: SourceArrays, radius: float, scale: float) -> _Apertures:

@@ -24,6 +24,7 @@ Counts = NDArray[np.int64]
 
 # Steps by the secant before every other one halves what is left.
 NEWTON_STEPS = 6
+BLOCK = 32768  # the arrays of a block stay in the cache
 
 
 def photons_of(expected: Floats, dead_share: float) -> Floats:
@@ -63,6 +64,14 @@ def dead_time_quantile(u: Floats, photons: Floats, dead_share: float, z: Floats)
         Poisson distribution of mean n (T - k tau), P(N <= k) >= u where q(k) <= k, and q never
         rises with k.
     """
+    counts = np.empty(photons.shape, np.int64)
+    for start in range(0, photons.size, BLOCK):
+        block = slice(start, start + BLOCK)
+        counts[block] = _block_quantile(u[block], photons[block], dead_share, z[block])
+    return counts
+
+
+def _block_quantile(u: Floats, photons: Floats, dead_share: float, z: Floats) -> Counts:
     # q(0), of the photons: a first upper end. At least one photon is at least one count.
     high = poisson_quantile(u, photons, z)
     left = np.flatnonzero(high > 1)

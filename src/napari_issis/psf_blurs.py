@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from .observation import Observation
-from .psf import TelescopePSF
+from .psf import PSF, TelescopePSF
 
 BLURS = ("jitter_fwhm", "blur_fwhm", "halo_share", "halo_fwhm")
 
@@ -20,8 +20,10 @@ def blurs_of(observation: Observation) -> dict[str, float] | None:
         Those of ``jitter_fwhm blur_fwhm halo_share halo_fwhm`` that differ; empty for the
         channel's own PSF. None if the PSF differs in more.
     """
+    if observation.psf is None:
+        return {}
     own = observation.replace(psf=None).effective_psf
-    psf = observation.effective_psf
+    psf = observation.psf
     if not isinstance(psf, TelescopePSF) or not isinstance(own, TelescopePSF):
         return None
     values = {name: getattr(psf, name) for name in BLURS}
@@ -44,21 +46,39 @@ def with_blurs(observation: Observation, **blurs: Any) -> Observation:
     Raises
     ------
     ValueError
-        If a value is out of range; the message names it.
+        If a value is out of range, or the channel's own PSF is no `TelescopePSF`; the message
+        names it.
     """
     bare = observation.replace(psf=None)
+    if not blurs:
+        return bare
     own = bare.effective_psf
-    assert isinstance(own, TelescopePSF)
+    if not isinstance(own, TelescopePSF):
+        raise ValueError(
+            f"the PSF of {observation.channel} is a {type(own).__name__}, which has no "
+            f"{', '.join(blurs)}; give the observation a PSF instead."
+        )
     psf = replace(own, **blurs)
     return bare if psf == own else bare.replace(psf=psf)
+
+
+def psf_choice(observation: Observation) -> dict[str, float] | PSF:
+    """Return what was chosen as the PSF, whatever the channel: blurs (`blurs_of`), or all of it."""
+    blurs = blurs_of(observation)
+    return observation.effective_psf if blurs is None else blurs
+
+
+def with_psf_choice(observation: Observation, choice: dict[str, float] | PSF) -> Observation:
+    """Return the observation with what `psf_choice` returned of another one."""
+    if isinstance(choice, dict):
+        return with_blurs(observation, **choice)
+    return observation.replace(psf=choice)
 
 
 def with_blurs_of(observation: Observation, other: Observation) -> Observation:
     """Return the observation with the blurs of another one, in the band that is its own.
 
-    If either has a PSF that differs in more than blurs, nothing changes.
+    If the other's PSF differs from its channel's own in more than blurs, nothing changes.
     """
     blurs = blurs_of(other)
-    if blurs is None or blurs_of(observation.replace(psf=None)) is None:
-        return observation
-    return with_blurs(observation, **blurs)
+    return observation if blurs is None else with_blurs(observation, **blurs)

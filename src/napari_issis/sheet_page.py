@@ -18,7 +18,7 @@ from .fits_light_path import sky_description
 from .observation import Observation
 from .photometry import ab_magnitude
 from .psf import RadialPSF, fwhm
-from .reproduction import reproduction_code, unwritten
+from .reproduction import reproduction_code, unwritten, unwritten_sources
 from .sheet_pictures import image_svg, model_svg
 from .source_counts import expected_counts
 from .source_rates import flux_pivots, sources_and_rates
@@ -204,7 +204,7 @@ def _settings(results: Sequence[ChannelResult], labels: Sequence[str]) -> str:
             ),
             ("Count rate of 1e-16 erg s⁻¹ cm⁻² Å⁻¹", f"{1e-16 * one.cps_per_flux:.4g} cps"),
             ("Sky", f"{one.sky_rate:.3g} cps per pixel: {sky_description(one)}"),
-            ("Dark rate", f"{one.dark:.3g} cps per pixel"),
+            ("Dark rate", f"{one.dark_rate:.3g} cps per pixel"),
             ("Detector", _detector(one)),
             ("Sources in the frame", f"{result.source_rate:.4g} cps"),
             ("Expected background", f"{exposure.background:.3g} counts per pixel"),
@@ -325,6 +325,11 @@ def _assumptions(results: Sequence[ChannelResult], added: str) -> list[str]:
     texts += [f"{name}: {camera.filter_note}" for name in curves]
     if added:
         texts.append(f"{added} was added with the same exposure time and its own PSF and sky.")
+    if unwritten_sources(results[0].exposure.sources):
+        texts.append(
+            "Sources that are images cannot be written on this page: the commands read all "
+            f"sources from {observations[0].channel}.fits, the saved exposure."
+        )
     for one in observations:
         missing = unwritten(one)
         if missing is not None:

@@ -25,6 +25,7 @@ STRIP = 34.0
 STAR_SIZE = 5.0
 SMALL_STAR = 2.5
 COLORMAP = "gray_r"
+IMAGE_COLOR = "#555"
 # Sources beyond which none has its name written beside it.
 NAMED = 40
 LENGTHS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -58,7 +59,7 @@ def model_svg(arrays: SourceArrays, names: Sequence[str], observation: Observati
             points = " ".join(f"{a:.2f},{b:.2f}" for a, b in corners)
             parts.append(f'<polygon points="{points}" fill="{POINT_COLOR}"/>')
         else:
-            color = ELLIPSE_COLORS[str(kind)]
+            color = ELLIPSE_COLORS.get(str(kind), IMAGE_COLOR)
             # the major axis drawn along y, then turned; SVG turns clockwise on the screen
             parts.append(
                 f'<ellipse rx="{reach * (1 - arrays.ellipticity[i]):.2f}" ry="{reach:.2f}" '

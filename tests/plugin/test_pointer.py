@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -95,6 +100,27 @@ def test_fingers_and_pens_are_left_to_qt(make_napari_viewer):
     for attribute in ("Touch", "Tablet"):
         name = f"AA_SynthesizeMouseForUnhandled{attribute}Events"
         assert QApplication.testAttribute(getattr(Qt.ApplicationAttribute, name))
+
+
+@pytest.mark.needs_gl
+def test_fingers_and_pens_drag_as_the_mouse_does(tmp_path):
+    """Catches a canvas that takes what fingers do, a drag lost on the way, or two steps for one."""
+    script = Path(__file__).with_name("fingers.py")
+    environment = {**os.environ, "NAPARI_CONFIG": "", "HOME": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", str(script)],
+        capture_output=True, text=True, timeout=300, env=environment, cwd=tmp_path,
+    )  # fmt: skip
+    if "No module named 'PyQt6'" in done.stderr or done.stdout == "skip\n":
+        pytest.skip("this Qt has no functions that take touches")
+    assert "Traceback" not in done.stderr, done.stderr
+    assert done.returncode == 0, done.stderr
+    lines = [line.split() for line in done.stdout.splitlines()]
+    # napari's canvas and Qt's mouse events have whole pixels of the screen
+    for (x, y, step, same), wanted in zip(lines, 2 * [(30, 20), (46, 40)], strict=True):
+        assert float(x) == pytest.approx(wanted[0], abs=0.2)
+        assert float(y) == pytest.approx(wanted[1], abs=0.2)
+        assert (step, same) == ("move-1-source", "True")
 
 
 def test_the_status_line(scene):

@@ -77,6 +77,20 @@ def test_an_edit_reaches_the_picture_and_is_undone(panel, scene):
     assert rows.blur.number == 0.0888
 
 
+def test_a_scripts_psf_comes_back_by_undo(panel, scene):
+    """Catches a button that throws away what only a script can make."""
+    given = OWN.replace(psf=GaussianPSF(0.15))
+    scene.observation = given
+    panel.psf.own.native.click()
+    assert scene.observation == OWN
+    scene.undo()
+    assert scene.observation == given
+    scene.undo()
+    assert scene.observation == OWN
+    scene.redo()
+    assert scene.observation == given
+
+
 def test_undo_of_the_psf_keeps_the_channel(panel, scene):
     """Catches a PSF with the band of the channel in which it was edited."""
     enter(panel.psf.jitter, "0.06")

@@ -70,7 +70,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             text="Sav&e FITS…", tooltip="Save the exposure as a FITS file: whole, or one image"
         )
         self.save.changed.connect(self.save_fits)
-        self.sheet = _tool("Shee&t…", self.ask_sheet)
+        self.sheet = _tool("Sheet…", self.ask_sheet)
         self.sheet.setToolTip("Write a proposal sheet: both channels, forecasts, commands")
         self._sheet_dialog: SheetDialog | None = None
         self.form = next(iter(FITS_FORMS))

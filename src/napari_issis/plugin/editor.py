@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..exposure import same_table
 from ..observation import Observation
-from ..psf_blurs import blurs_of, with_blurs
+from ..psf_blurs import psf_choice, with_psf_choice
 from ..source_rates import flux_pivots
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -150,8 +150,7 @@ class SourceEditor:
         """Put a state in the place of the present one; False if there is none."""
         if state is None:
             return False
-        if state.blurs is not None and blurs_of(self.observation) is not None:
-            self.observation = with_blurs(self.observation, **state.blurs)
+        self.observation = with_psf_choice(self.observation, state.psf)
         gone = np.isin(self.source_id, state.source_id, invert=True)
         self._bury(gone)
         self._set(state.sources, state.source_id)
@@ -186,7 +185,7 @@ class SourceEditor:
             self.take_over()
 
     def observe(self, observation: Observation) -> None:
-        """Take over another set-up; a change of its PSF's blurs is a step of the history."""
+        """Take over another set-up; a change of its PSF is a step of the history."""
         self.observation = observation
         if self.held is None:
             self._note()
@@ -204,7 +203,7 @@ class SourceEditor:
         self.history.note(self._state())
 
     def _state(self) -> SourceState:
-        return SourceState(self.sources, self.source_id, blurs_of(self.observation))
+        return SourceState(self.sources, self.source_id, psf_choice(self.observation))
 
     def _bury(self, gone: NDArray[np.bool_]) -> None:
         """Keep rows that go, for those that come back by paste."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from astropy.table import QTable
 from numpy.typing import NDArray
 
 from ..exposure import same_table
+from ..psf import PSF
 
 MOST_STEPS = 200
 # cells kept in all: large scenes keep fewer steps, but never less than LEAST_STEPS
@@ -27,18 +28,17 @@ class SourceState:
         The source table, which nobody changes in place.
     source_id : ndarray of int
         The ids of its rows.
-    blurs : dict, optional
-        What the PSF has in place of the channel's own, see `napari_issis.psf_blurs.blurs_of`.
+    psf : dict or PSF, optional
+        What was chosen as the PSF, see `napari_issis.psf_blurs.psf_choice`.
     """
 
     sources: QTable
     source_id: NDArray[np.int64]
-    blurs: dict[str, float] | None = None
+    psf: dict[str, float] | PSF = field(default_factory=dict)
 
     def same(self, other: SourceState) -> bool:
-        """Whether both hold the same rows, and the same blurs as far as they are known."""
-        known = self.blurs is not None and other.blurs is not None
-        return (not known or self.blurs == other.blurs) and self.same_rows(other)
+        """Whether both hold the same rows, and the same PSF."""
+        return self.psf == other.psf and self.same_rows(other)
 
     def same_rows(self, other: SourceState) -> bool:
         """Whether both hold the same rows."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import Qt, QTimer
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QWidget
 
 from .canvas_geometry import find_window
@@ -39,8 +40,15 @@ def toggle_panel(viewer: Any, name: str, make: Callable[[Any], QWidget], area: s
     widget = make(viewer)
     viewer.window.add_dock_widget(widget, name=name, area=area)
     window = find_window(widget)
+
+    def stack() -> None:
+        # the window may have been closed meanwhile
+        with suppress(RuntimeError):
+            stack_at_bottom(window)
+
     if window is not None:
-        stack_at_bottom(window)
+        # napari shows it a little later
+        QTimer.singleShot(0, stack)
 
 
 def stack_at_bottom(window: QMainWindow) -> None:
@@ -56,7 +64,10 @@ def stack_at_bottom(window: QMainWindow) -> None:
                 found[name] = dock
     heights = {ROW_NAME: ROW_HEIGHT, LIST_NAME: LIST_HEIGHT}
     if len(found) == 2 and not window.tabifiedDockWidgets(found[ROW_NAME]):
+        # one that is being shown just now is not moved unless it is taken out first
+        window.removeDockWidget(found[LIST_NAME])
         window.splitDockWidget(found[ROW_NAME], found[LIST_NAME], Qt.Orientation.Vertical)
+        found[LIST_NAME].show()
     window.resizeDocks(
         list(found.values()), [heights[name] for name in found], Qt.Orientation.Vertical
     )

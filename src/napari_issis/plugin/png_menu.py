@@ -64,7 +64,7 @@ class PngMenu(QMenu):  # type: ignore[misc]
         counts, exposure = self.scene.counts, self.scene.exposure
         layer = counts.layer
         if layer is None:
-            raise ValueError("the image layer was deleted; change a source to make it anew.")
+            raise ValueError("the layer of the final image was deleted; restore it in the panel.")
         scale, limits = counts.effective_scale, counts.limits
         level = stretched(scale, layer.data, limits, exposure.background)
         colors = (255 * counts.base_colormap.map(np.arange(256) / 255)[:, :3]).round()

@@ -75,7 +75,9 @@ class PsfRows:
             form.add("Halo (1, ″)", self.share, self.width),
             form.add("", self.own),
         ]
-        form.add_native(QLabel("Light in ⌀"), self.read_out)
+        name = QLabel("Light in ⌀")
+        name.setToolTip(self.read_out.toolTip())
+        form.add_native(name, self.read_out)
         self._rows.append(self.read_out)
         self._shown: PSF | None = None
         self._jobs = LatestWins(self._show_table, self._failed)
@@ -105,7 +107,7 @@ class PsfRows:
         psf = observation.effective_psf
         self.own.enabled = not observation.psf_assumed
         for field, name in zip(self._fields, BLURS, strict=True):
-            field.enabled = blurs is not None
+            field.enabled = blurs is not None and isinstance(psf, TelescopePSF)
             # what is being typed, or has to be corrected, stays unless the PSF changed
             if isinstance(psf, TelescopePSF) and psf != self._shown:
                 field.number = getattr(psf, name)

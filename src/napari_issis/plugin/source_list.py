@@ -106,7 +106,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             ("Delete", "Remove the selected sources (Del)", self.delete),
             ("&Import…", "Add a catalogue: ECSV, CSV, FITS, VOTable, DS9", self.load),
             ("Expor&t…", "Write the sources to a file: ECSV, CSV, FITS, VOTable", self.save),
-            ("&Photometry…", "Measure sources in apertures, beside the truth", self.photometry),
+            ("Photometry…", "Measure sources in apertures, beside the truth", self.photometry),
         ):
             button = QPushButton(label)
             button.setToolTip(tooltip)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sources import SourceArrays
+from ..sources import IMAGE, SourceArrays
 from . import _render, peaks
 from .optics import Optics
 
@@ -34,7 +34,7 @@ def wide_images(optics: Optics, one: SourceArrays, shape: tuple[int, int]) -> Ar
     Returns
     -------
     ndarray, shape (6, ny, nx)
-        On the whole frame.
+        On the whole frame; (3, ny, nx) of an image, whose size and angle are known.
     """
     rate = np.ones(1)
     peak = peaks(optics, one, rate)
@@ -44,7 +44,10 @@ def wide_images(optics: Optics, one: SourceArrays, shape: tuple[int, int]) -> Ar
 
     scale = {"r_half": float(one.r_half[0]), "ellipticity": 1 - float(one.ellipticity[0])}
     images = [image(one)]
+    known = ("r_half", "ellipticity", "pa") if one.kind[0] == IMAGE else ()
     for name, share in STEPS.items():
+        if name in known:
+            continue
         value, step = getattr(one, name), share * scale.get(name, 1.0)
         ahead = image(replace(one, **{name: value + step}))
         images.append((ahead - image(replace(one, **{name: value - step}))) / (2 * step))
