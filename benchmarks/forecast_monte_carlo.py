@@ -113,7 +113,8 @@ def _measure(scenes: Sequence[str], fits: int) -> list[Outcome]:
                 outcomes.append(_kept("pair", separation, pair, small, snr, fits))
     if "quad" in scenes:
         quad = ni.lensed_quasar("Q2237+0305", large)
-        outcomes += [_kept("quad", 0.0, quad, large, snr, fits) for snr in SNRS[:5]]
+        # below that the fits of the galaxy's shape wander, and take several times as long
+        outcomes += [_kept("quad", 0.0, quad, large, snr, fits) for snr in SNRS[2:5]]
     return outcomes
 
 
