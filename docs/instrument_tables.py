@@ -227,11 +227,11 @@ TABLES: dict[str, Callable[[], Rows]] = {
 }
 
 
-def filled(page: str) -> str:
+def filled(page: str, tables: dict[str, Callable[[], Rows]] = TABLES) -> str:
     """Return the page with all its tables made anew."""
 
     def table(match: re.Match[str]) -> str:
-        head, *body = TABLES[match[1]]()
+        head, *body = tables[match[1]]()
         text = [head, ["---"] * len(head), *body]
         made = "\n".join(f"| {' | '.join(row)} |" for row in text)
         return f"<!-- table: {match[1]} -->\n{made}\n<!-- end -->"

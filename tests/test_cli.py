@@ -336,6 +336,17 @@ def test_an_exposure_as_the_scene_is_rendered_the_same(star):
     assert Exposure.read("x.fits") == Exposure.read("y.fits")
 
 
+def test_one_image_alone(star, capsys):
+    """Catches an option that is parsed and then forgotten."""
+    options = ["--image", "expected", "--image-only"]
+    main(["simulate", star, *FRAME, *options, "--output", "x.fits"])
+    main(["simulate", star, *FRAME, "--output", "whole.fits"])
+    with fits.open("x.fits") as hdus:
+        assert len(hdus) == 1
+        np.testing.assert_array_equal(hdus[0].data, Exposure.read("whole.fits").expected)
+    assert "the file holds no table" in refused(capsys, "simulate", "x.fits", "--output", "y.fits")
+
+
 def test_further_files(star, capsys):
     """Catches an option that is parsed and then forgotten."""
     files = ["--rgba", "r.png", "--model", "m.png", "--png", "p.png"]

@@ -199,6 +199,8 @@ def test_header_of_an_observatory(tmp_path, compress):
             # the paper's 4.9e-3 cps/pixel and 3.36e15 cps, both through NF1 (0.1)
             assert header["SKYRATE"] == pytest.approx(4.9e-4)
             assert header["CPSFLUX"] == pytest.approx(3.36e14)
+            assert "flat" in header.comments["CPSFLUX"]
+            assert "CPSFLUX" not in " ".join(header["COMMENT"])
             assert header["SKYCOUNT"] == pytest.approx(4.9e-4 * 250)
             assert header["PSFASSUM"] is True
             assert "1.7 m" in header["PSFDESC"]

@@ -6,7 +6,7 @@ from astropy.table import vstack
 
 import napari_issis as ni
 from napari_issis.bright_sources import bright_sources
-from napari_issis.limits import count_rate_warnings
+from napari_issis.limits import brief_warning, count_rate_warnings
 
 SHAPE = (80, 90)
 # FWHM of 3 pixels: 9 % of a star's light falls into its central pixel.
@@ -91,3 +91,25 @@ def test_the_cure_leaves_curves_in_their_wheels(filters, peak, cure):
     observation = ni.Observation(filters=filters, shape=(1, 1))
     *_, message = count_rate_warnings(np.array([[peak]]), 0.0, observation=observation)
     assert message.endswith(cure)
+
+
+def brief(table, observation=OBSERVATION):
+    rate = ni.count_rate(table, observation)
+    return brief_warning(rate, observation.background_rate, table, observation)
+
+
+def test_in_a_line_or_two():
+    """Catches another source than the brightest, a limit of the other kind, and a wrong cure."""
+    above = 22 / SHARE
+    assert brief(star(20, 60, 0.9 * above)) == ""
+    stars = vstack([star(20, 60, 5 * above), star(70, 10, 30 * above), star(30, 20, 6 * above)])
+    rate = ni.count_rate(stars, OBSERVATION).max() + OBSERVATION.background_rate
+    assert brief(stars) == (
+        f"Too bright: {rate:.3g} cps/px (limit 22), row 1 and 2 more. NF2 would cure it."
+    )
+    filtered = OBSERVATION.replace(filters=("NF1", "open"))
+    assert brief(stars, filtered).endswith(", row 1. NF2 in place of NF1 would cure it.")
+    wide = ni.source("uniform", 40, 40, 3e5 / 1.14e17, r_half=200.0)
+    frame = OBSERVATION.replace(shape=(512, 512))
+    assert brief(wide, frame).startswith("Too bright: 2.")
+    assert "cps in all (limit 2e+05). NF1 would cure it." in brief(wide, frame)

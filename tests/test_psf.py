@@ -149,7 +149,8 @@ def test_bad_parameters(make, message):
 
 
 def test_image_psf_from_fits(tmp_path):
-    samples = np.arange(12.0).reshape(3, 4)
+    row = np.exp(-0.5 * (np.arange(-5, 6) / 1.5) ** 2)
+    samples = np.outer(np.exp(-0.5 * (np.arange(-6, 7) / 1.5) ** 2), row)
     fits.PrimaryHDU(samples).writeto(tmp_path / "bare.fits")
     with pytest.raises(ValueError, match="pixel scale"):
         ni.ImagePSF.from_fits(tmp_path / "bare.fits")

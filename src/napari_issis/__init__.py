@@ -12,11 +12,16 @@ from .exposure import Exposure, simulate
 from .exposure_goal import exposure_for
 from .filters import Filter
 from .forecast import forecast
+from .host_arcs import host_arcs
 from .image_psf import ImagePSF
 from .instrument import Instrument
 from .instruments import INSTRUMENTS
+from .lens_delays import isothermal_delays
 from .lens_model import lens_images
 from .lensed_quasars import lensed_quasar, lensed_quasars
+from .light_curve_fit import fit_light_curves
+from .light_curve_plot import plot_light_curves
+from .light_curves import damped_random_walk, sinusoid
 from .limits import CountRateWarning
 from .monitoring import Epoch, Monitoring, monitor
 from .observation import Observation
@@ -25,6 +30,7 @@ from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .render import count_rate
 from .sky import SKIES, Sky
 from .source_counts import expected_counts, signal_to_noise
+from .source_image import SourceImage, image_source
 from .sources import source
 from .spectra import BlackBody, Flat, Line, PowerLaw, Spectrum, TableSpectrum, parse_spectrum
 
@@ -32,16 +38,19 @@ if TYPE_CHECKING:
     from astropy.table import Table
     from napari.viewer import Viewer
 
+    from .apertures import aperture_photometry
     from .catalogue import Catalogue, read_catalogue, read_sources, write_sources
     from .fits_image import FitsImage, read_image
     from .plugin.scene import Scene
     from .png import write_png, write_source_png
     from .rgba import read_rgba, write_rgba
+    from .sheet import proposal_sheet
 
 __version__ = "0.1.0"
 
-# Reading and writing of files, loaded when first used: astropy's formats take their time.
-_FILES = {
+# Loaded when first used: astropy's formats and statistics take their time.
+_LATER = {
+    "aperture_photometry": "apertures",
     "Catalogue": "catalogue",
     "read_catalogue": "catalogue",
     "read_sources": "catalogue",
@@ -50,6 +59,7 @@ _FILES = {
     "read_image": "fits_image",
     "write_png": "png",
     "write_source_png": "png",
+    "proposal_sheet": "sheet",
     "read_rgba": "rgba",
     "write_rgba": "rgba",
 }
@@ -77,18 +87,27 @@ __all__ = [
     "Observation",
     "PowerLaw",
     "Sky",
+    "SourceImage",
     "Spectrum",
     "TableSpectrum",
     "TelescopePSF",
+    "aperture_photometry",
     "count_rate",
+    "damped_random_walk",
     "expected_counts",
     "exposure_for",
+    "fit_light_curves",
     "forecast",
+    "host_arcs",
+    "image_source",
+    "isothermal_delays",
     "lens_images",
     "lensed_quasar",
     "lensed_quasars",
     "monitor",
     "parse_spectrum",
+    "plot_light_curves",
+    "proposal_sheet",
     "random_sources",
     "read_catalogue",
     "read_image",
@@ -97,6 +116,7 @@ __all__ = [
     "show",
     "signal_to_noise",
     "simulate",
+    "sinusoid",
     "source",
     "star_cluster",
     "write_png",
@@ -107,9 +127,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _FILES:
+    if name not in _LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_FILES[name]}", __name__), name)
+    return getattr(import_module(f".{_LATER[name]}", __name__), name)
 
 
 def show(

@@ -15,10 +15,12 @@ from .catalogue_sources import DEFAULT_UNITS, to_sources
 from .ds9_regions import SUFFIXES as REGION_SUFFIXES
 from .ds9_regions import read_regions
 from .fits_io import SUFFIXES as FITS_SUFFIXES
+from .fits_source_images import image_hdus, keep_images
 from .fits_table import open_fits, read_table, table_hdu
 from .observation import Observation
 from .reading import one_line
 from .safe_write import replacing
+from .source_image import check_in_files
 from .sources import check_sources
 from .text_tables import read_text_table
 from .votable import SUFFIXES as VOTABLE_SUFFIXES
@@ -99,6 +101,7 @@ def read_catalogue(
             hdu = _table_extension(hdus)
             names = hdu.columns.names
             table = read_table(hdu)
+            keep_images(hdus)
             left_out = [name for name in names if name not in table.colnames]
             sources, notes = to_sources(table, observation)
             if left_out:
@@ -146,7 +149,8 @@ def write_sources(table: Table, path: str | os.PathLike[str], *, overwrite: bool
     ------
     ValueError
         If the table is no valid source table, the ending is unknown, or the format cannot
-        hold it: CSV has no units, so only the default ones go into it.
+        hold it: CSV has no units, so only the default ones go into it. FITS holds the images
+        that sources are; the others name the image's file, so it must have one.
     OSError
         If the file cannot be written; `FileExistsError` if it exists.
     """
@@ -155,10 +159,11 @@ def write_sources(table: Table, path: str | os.PathLike[str], *, overwrite: bool
         raise ValueError(f"{path} is no source table; its name must end in {', '.join(SUFFIXES)}.")
     check_sources(table)
     if suffix in FITS_SUFFIXES:
-        hdus = fits.HDUList([fits.PrimaryHDU(), table_hdu(table, "SOURCES")])
+        hdus = fits.HDUList([fits.PrimaryHDU(), table_hdu(table, "SOURCES"), *image_hdus(table)])
         with replacing(path, SUFFIXES, overwrite=overwrite) as file:
             hdus.writeto(file, output_verify="exception", checksum=True)
         return
+    check_in_files(table)
     if suffix in VOTABLE_SUFFIXES:
         content = votable_bytes(table)
         with replacing(path, SUFFIXES, overwrite=overwrite) as file:

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from .catalogue_columns import KINDS_ELSEWHERE, Meaning, meanings
 from .frame_coordinates import sky_to_frame
 from .observation import Observation
-from .sources import COLUMNS, FLUX_UNIT, KINDS, check_sources
+from .sources import COLUMNS, FLUX_UNIT, IMAGE, KINDS, check_sources
 
 Array = NDArray[np.float64]
 
-OWN = (*COLUMNS, "n", "spectrum")
+OWN = (*COLUMNS, "n", "spectrum", "image")
 # Units of a column that comes without one.
 DEFAULT_UNITS = {
     "x": u.pix,
@@ -69,7 +69,9 @@ def to_sources(table: Table, observation: Observation | None) -> tuple[QTable, t
     reading.flux()
     reading.shape()
     reading.kind()
-    reading.spectrum()
+    reading.texts("spectrum")
+    if IMAGE in reading.new["kind"]:
+        reading.texts("image")
     return reading.result()
 
 
@@ -253,14 +255,13 @@ class _Reading:
         if extended.any() and "r_half" in self.new:
             self.round_where_missing(extended)
 
-    def spectrum(self) -> None:
+    def texts(self, name: str) -> None:
         """Take texts in a column of just this name; numbers in it mean something else."""
-        if "spectrum" not in self.table.colnames:
+        if name not in self.table.colnames:
             return
-        values, mask = _unmasked(self.table["spectrum"])
+        values, mask = _unmasked(self.table[name])
         if values.dtype.kind in "US" or mask.all():
-            texts = np.where(mask, "", values.astype(str))
-            self.put("spectrum", texts, "spectrum")
+            self.put(name, np.where(mask, "", values.astype(str)), name)
 
     def round_where_missing(self, extended: NDArray[np.bool_]) -> None:
         """Take galaxies for round where the catalogue says nothing of their shape."""

@@ -1,4 +1,4 @@
-"""Poisson noise that is a pure function of the expected counts, the seed and the pixel."""
+"""Noise that is a pure function of the expected counts, the seed and the pixel."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from .dead_time import dead_time_quantile, photons_of
 from .poisson_quantile import poisson_quantile
 
 MAX_EXPECTED = 1e15
@@ -20,10 +21,11 @@ def poisson_counts(
     expected: NDArray[np.float64],
     seed: int,
     *,
+    dead_share: float = 0.0,
     previous: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None,
     windows: Sequence[tuple[slice, slice]] | None = None,
 ) -> NDArray[np.int64]:
-    """Draw Poisson counts.
+    """Draw Poisson counts, or those of a detector with a dead time.
 
     The counts of a pixel are the smallest k with CDF(k; expected) >= u, u being the pixel's
     own uniform number (`pixel_uniforms`). Hence they depend on nothing but its expected
@@ -35,6 +37,10 @@ def poisson_counts(
         Expected counts, from 0 to 1e15.
     seed : int
         Seed of the noise, 0 or more.
+    dead_share : float
+        Time for which a pixel is blind after each count, over the exposure time; then
+        ``expected`` is reduced by it, to lambda / (1 + lambda d) for lambda photons, and the
+        distribution that of `napari_issis.dead_time`.
     previous : (ndarray, ndarray), optional
         Expected counts and counts of an earlier call with the same seed and shape. Only the
         pixels whose expected counts differ are drawn; the result is the same.
@@ -45,14 +51,14 @@ def poisson_counts(
     Returns
     -------
     ndarray of int64, shape (ny, nx)
-        The counts, exactly Poisson-distributed to the resolution of a 53-bit uniform number.
+        The counts, exactly so distributed to the resolution of a 53-bit uniform number.
 
     Raises
     ------
     ValueError
         If an expected number is negative, not finite or above 1e15, the array is not
-        two-dimensional, the seed is not an integer of 0 or more, or `previous` has
-        another shape.
+        two-dimensional, the seed is not an integer of 0 or more, `previous` has another
+        shape, or a pixel receives more than 1e15 photons, of which a dead time leaves fewer.
     """
     expected = np.asarray(expected, dtype=np.float64)
     if expected.ndim != 2:
@@ -62,9 +68,12 @@ def poisson_counts(
     whole = (slice(None), slice(None))
     parts = [whole] if previous is None or windows is None else list(windows)
     _check_range(expected, parts)
+    if dead_share > 0:
+        _check_photons(expected, parts, dead_share)
     u, z = _uniforms_and_normals(checked_seed(seed), expected.shape)
     if previous is None:
-        return poisson_quantile(u.ravel(), expected.ravel(), z.ravel()).reshape(expected.shape)
+        drawn = _quantile(u.ravel(), expected.ravel(), z.ravel(), dead_share)
+        return drawn.reshape(expected.shape)
     before, counts_before = (np.asarray(a) for a in previous)
     if before.shape != expected.shape or counts_before.shape != expected.shape:
         raise ValueError(
@@ -74,9 +83,20 @@ def poisson_counts(
     counts = counts_before.astype(np.int64)
     for part in parts:
         changed = expected[part] != before[part]
-        drawn = poisson_quantile(u[part][changed], expected[part][changed], z[part][changed])
+        drawn = _quantile(u[part][changed], expected[part][changed], z[part][changed], dead_share)
         counts[part][changed] = drawn
     return counts
+
+
+def _quantile(
+    u: NDArray[np.float64],
+    expected: NDArray[np.float64],
+    z: NDArray[np.float64],
+    dead_share: float,
+) -> NDArray[np.int64]:
+    if dead_share > 0:
+        return dead_time_quantile(u, photons_of(expected, dead_share), dead_share, z)
+    return poisson_quantile(u, expected, z)
 
 
 def pixel_uniforms(seed: int, shape: tuple[int, int]) -> NDArray[np.float64]:
@@ -131,6 +151,20 @@ def checked_seed(seed: Any) -> int:
     if not isinstance(seed, Integral) or seed < 0:
         raise ValueError(f"seed is {seed!r}; it must be an integer of 0 or more.")
     return int(seed)
+
+
+def _check_photons(
+    expected: NDArray[np.float64], parts: Sequence[tuple[slice, slice]], dead_share: float
+) -> None:
+    for part in parts:
+        brightest = expected[part].max(initial=0.0)
+        photons = float(photons_of(np.array([brightest]), dead_share)[0])
+        if photons > MAX_EXPECTED:
+            y, x = np.argwhere(expected == brightest)[0]
+            raise ValueError(
+                f"pixel [{y}, {x}] receives {photons:.4g} photons in the exposure, more than "
+                f"{MAX_EXPECTED:g}; shorten the exposure or make the sources fainter."
+            )
 
 
 def _check_range(expected: NDArray[np.float64], parts: Sequence[tuple[slice, slice]]) -> None:

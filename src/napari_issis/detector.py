@@ -37,12 +37,16 @@ class Detector:
     Notes
     -----
     A dead time that further photons do not prolong (non-paralyzable) makes the detected rate
-    m = n / (1 + n tau) of the true rate n (Knoll 2010, Radiation Detection and Measurement,
-    4th ed., section 4.VII; Feller 1948). It acts on each pixel by itself; a loss over the whole
-    detector is not modelled.
+    m = n / (1 + n tau) of the true rate n: the mean time from one count to the next is that to
+    the next photon, 1 / n, and tau. The counts are drawn from their exact distribution, which is
+    narrower than Poisson's, see `napari_issis.dead_time`: the variance is about
+    m T / (1 + n tau)^2. The expected counts are m T, which the exact mean exceeds by less than
+    half a count in exposures much longer than tau and 1 / n.
 
-    The counts are drawn as Poisson numbers of the reduced expectation. Those of a real dead
-    time scatter less: their variance is about m T / (1 + n tau)^2, 2 % less at 1 % loss.
+    Each pixel loses by itself. A loss in electronics that all pixels share is not modelled: it
+    depends on the rate N of the whole detector, of which the frame is a part. It is one factor
+    for all pixels, that of an exposure shortened to T / (1 + N tau); who knows N and tau can
+    give that time.
     """
 
     dead_time: float = 0.0
@@ -87,6 +91,14 @@ class Detector:
     def detected(self, rate: Array) -> Array:
         """Return the rate that is counted of a true rate, cps per pixel, any shape."""
         return rate / (1 + rate * self.dead_time) if self.dead_time else rate
+
+    def received(self, rate: Array) -> Array:
+        """Return the true rate of which a rate is counted, cps per pixel, any shape.
+
+        Infinite from one count per dead time on.
+        """
+        seeing = 1 - rate * self.dead_time
+        return np.divide(rate, seeing, out=np.full_like(rate, np.inf), where=seeing > 0)
 
     def stored(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the numbers that the memory holds after these counts, any shape."""

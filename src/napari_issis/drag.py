@@ -147,7 +147,8 @@ def _shape_of(one: SourceArrays) -> tuple[object, ...]:
         return ("point",)
     return (
         str(one.kind[0]),
-        None if one.kind[0] == "uniform" else float(one.index[0]),
+        str(one.image[0]),
+        float(one.index[0]) if np.isfinite(one.index[0]) else None,
         float(one.r_half[0]),
         float(one.ellipticity[0]),
         float(one.pa[0]),

@@ -203,7 +203,9 @@ def expose(
     """
     expected = expected_of_rate(rate, observation)
     return Exposure(
-        counts=observation.detector.stored(poisson_counts(expected, seed)),
+        counts=observation.detector.stored(
+            poisson_counts(expected, seed, dead_share=dead_share(observation))
+        ),
         expected=expected,
         sources=QTable(sources, copy=True),
         observation=observation,
@@ -216,6 +218,11 @@ def expected_of_rate(rate: NDArray[np.float64], observation: Observation) -> NDA
     """Return the expected counts of a count rate of the sources in cps per pixel, any shape."""
     rate = observation.detector.detected(rate + observation.background_rate)
     return np.asarray(rate * observation.exposure)
+
+
+def dead_share(observation: Observation) -> float:
+    """Return the detector's dead time over the exposure time."""
+    return observation.detector.dead_time / observation.exposure
 
 
 def same_table(first: Table, second: Table) -> bool:

@@ -8,10 +8,14 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.table import Table
+from numpy.typing import NDArray
 
-from .fisher import covariance
+from .fisher import Covariance, covariance
 from .limits import warn_of_count_rates
 from .observation import Observation
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 
 def exposure_for(
@@ -70,14 +74,41 @@ def exposure_for(
         raise ValueError(f"{len(given)} goals are given; give one of snr, flux_ratio and position.")
     ((name, value),) = given.items()
     goal = _number(name, value, observation.pixel_scale)
-    chosen = np.atleast_1d(np.asarray(rows, dtype=np.intp))
+    chosen = checked_rows(name, rows, len(sources))
+    result = covariance(sources, observation)
+    value, _ = after_one_second(result, name, chosen)
+    warn_of_count_rates(result.source_rate, sources, observation)
+    return seconds_for(name, goal, value) * u.s
+
+
+def checked_rows(name: str, rows: int | Sequence[int], count: int) -> Rows:
+    """Return rows of a table of ``count`` sources that a goal can be for.
+
+    Raises
+    ------
+    ValueError
+        If there is none, one does not exist, or a flux ratio is not of two.
+    """
+    chosen: Rows = np.atleast_1d(np.asarray(rows, dtype=np.intp))
     if not chosen.size:
         raise ValueError("rows is empty; name at least one row of the source table.")
-    for row in chosen[(chosen < 0) | (chosen >= len(sources))]:
-        raise ValueError(f"there is no row {row}; the table has {len(sources)} rows, from 0.")
+    for row in chosen[(chosen < 0) | (chosen >= count)]:
+        raise ValueError(f"there is no row {row}; the table has {count} rows, from 0.")
     if name == "flux_ratio" and (chosen.size != 2 or chosen[0] == chosen[1]):
         raise ValueError(f"rows is {chosen.tolist()}; flux_ratio takes two different rows.")
-    result = covariance(sources, observation)
+    return chosen
+
+
+def after_one_second(result: Covariance, name: str, chosen: Rows) -> tuple[float, int]:
+    """Return what 1 s of exposure reaches for the worst of the chosen rows, and that row.
+
+    An S/N, a relative error of a flux ratio, or an error of a position in pixels.
+
+    Raises
+    ------
+    ValueError
+        If one of them is never reached; the message names the row.
+    """
     rates = result.rates[chosen]
     for row in chosen[rates <= 0] if name != "position" else ():
         raise ValueError(f"row {row} has no flux: no exposure time reaches the goal.")
@@ -86,16 +117,28 @@ def exposure_for(
             f"row {row} cannot be measured (no flux, outside the frame, or at the place of "
             "another source): no exposure time reaches the goal."
         )
+    if name == "position":
+        errors = np.sqrt(result.variance[chosen, 1:3].max(axis=1))
+        worst = int(np.argmax(errors))
+        return float(errors[worst]), int(chosen[worst])
+    relative = np.sqrt(result.variance[chosen, 0]) / rates
+    worst = int(np.argmax(relative))
     if name == "snr":
-        seconds = goal**2 * result.variance[chosen, 0] / rates**2
-    elif name == "position":
-        seconds = result.variance[chosen, 1:3].max(axis=1) / goal**2
-    else:
-        relative = np.sqrt(result.variance[chosen, 0]) / rates
-        correlation = result.correlation.tocsr()[int(chosen[0]), int(chosen[1])]
-        seconds = (relative @ relative - 2 * correlation * relative.prod()) / goal**2
-    warn_of_count_rates(result.source_rate, sources, observation)
-    return float(np.max(seconds)) * u.s
+        return float(1 / relative[worst]), int(chosen[worst])
+    correlation = result.correlation.tocsr()[int(chosen[0]), int(chosen[1])]
+    variance = relative @ relative - 2 * correlation * relative.prod()
+    return float(np.sqrt(variance)), int(chosen[worst])
+
+
+def seconds_for(name: str, goal: float, value: float) -> float:
+    """Exposure time, s, that reaches a goal from what 1 s reaches."""
+    return (goal / value) ** 2 if name == "snr" else (value / goal) ** 2
+
+
+def reached(name: str, value: float, seconds: Array) -> Array:
+    """Return what exposures reach, from what 1 s reaches."""
+    root: Array = np.sqrt(seconds)
+    return value * root if name == "snr" else value / root
 
 
 def _number(name: str, value: Any, pixel_scale: float) -> float:

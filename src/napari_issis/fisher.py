@@ -12,30 +12,35 @@ import numpy as np
 from astropy.table import Table
 from numpy.typing import NDArray
 from scipy import linalg
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from .exposure import noise_ready_rate
+from .information import joint_information, own_information
 from .observation import Observation
-from .render.derivatives import Derivatives, derivatives
+from .render.derivatives import derivatives
 from .render.optics import Optics
 from .source_rates import sources_and_rates
-from .sources import SourceArrays
+from .sources import IMAGE, SourceArrays
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 # most parameters that a source has: flux, x, y, r_half, ellipticity, pa
 PARAMETERS = 6
 # windows end where a source falls below this share of the sky, but within these shares of
 # a point source's peak
 SKY_SHARE = 0.02
-HIGHEST_LEVEL, LOWEST_LEVEL = 1e-4, 1e-5
-TILE = 32
+HIGHEST_LEVEL, LOWEST_LEVEL = 1e-4, 3e-5
 # sources whose parameters are coupled by less than this are inverted apart
 COUPLED = 1e-4
-# eigenvalues of the normalised information below which a combination is undetermined
+# most sources inverted at once, and the coupling of those around them that come with them
+MOST, AROUND = 300, 3e-3
+# variances of a normalised parameter above which combinations may be undetermined...
+LARGE = 1e7
+# ...eigenvalues of the normalised information below which one is...
 SINGULAR = 1e-11
-# share of an undetermined combination above which a parameter is undetermined too
+# ...and the share in it above which a parameter is undetermined too
 INVOLVED = 1e-6
 # pixels are not expected to be darker than this share of the brightest
 DARKEST = 1e-9
@@ -85,140 +90,103 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     sky = observation.background_rate
     rate, _ = noise_ready_rate(sources, observation)
     optics = Optics(observation.effective_psf, observation.pixel_scale)
-    parts = [
-        _derivatives(optics, arrays, float(rates[i]), i, sky, observation)
-        for i in range(len(arrays))
-    ]
+    level, share = _levels(optics, arrays, rates, sky)
+    parts = derivatives(optics, arrays, level, share, observation.shape)
     expected = rate + sky
     expected = np.maximum(expected, DARKEST * float(expected.max(initial=0.0)))
-    counts = np.where(arrays.kind == "point", 3, PARAMETERS)
-    first = np.concatenate([[0], np.cumsum(counts)]).astype(int)
-    information = _information(parts, rates, expected, first)
-    values, flux_correlation = _invert(information, first)
+    counts = np.where(np.isin(arrays.kind, ("point", IMAGE)), 3, PARAMETERS)
+    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+    scale = np.repeat(rates, counts)
+    scale[first[:-1]] = 1.0
+    information = joint_information(parts, scale, expected, first)
+    values, flux_correlation = _invert(information, first, arrays)
     variance = np.full((len(arrays), PARAMETERS), np.nan)
     for i, count in enumerate(counts):
         variance[i, :count] = values[first[i] : first[i + 1]]
-    alone = np.array([_alone(part, float(r), sky) for part, r in zip(parts, rates, strict=True)])
-    return Covariance(arrays, rates, rate, variance, alone, flux_correlation)
-
-
-def _derivatives(
-    optics: Optics, arrays: SourceArrays, rate: float, i: int, sky: float, observation: Observation
-) -> Derivatives | None:
-    one = arrays.take(slice(i, i + 1))
-    size = np.pi * float(one.r_half[0]) ** 2 * (1 - float(one.ellipticity[0]))
-    peak = 1 / (optics.point_area + 2 * size)
-    level = SKY_SHARE * sky / rate if rate > 0 else HIGHEST_LEVEL * peak
-    level = float(np.clip(level, LOWEST_LEVEL * peak, HIGHEST_LEVEL * peak))
-    return derivatives(optics, one, level, observation.shape)
-
-
-def _scaled(part: Derivatives, rate: float) -> Array:
-    """Scale derivatives of the image to those of the count rate of a source of that rate."""
-    scale = np.full(len(part.images), rate)
-    scale[0] = 1.0
-    scaled: Array = part.images * scale[:, None, None]
-    return scaled
-
-
-def _information(
-    parts: list[Derivatives | None], rates: Array, expected: Array, first: NDArray[np.int_]
-) -> coo_array:
-    """Sum the Fisher information over tiles of the frame, sparse, shape (m, m)."""
-    inverse = np.divide(1.0, expected, out=np.zeros_like(expected), where=expected > 0)
-    root = np.sqrt(inverse)
-    weighted: list[Array | None] = [
-        None if part is None else _scaled(part, float(rate)) * root[part.window]
-        for part, rate in zip(parts, rates, strict=True)
+    own = [
+        np.zeros((count, count))
+        if part is None
+        else own_information(part, scale[start : start + count], sky, DARKEST)
+        for part, start, count in zip(parts, first[:-1], counts, strict=True)
     ]
-    ny, nx = expected.shape
-    tiles: dict[tuple[int, int], list[int]] = {}
-    for i, part in enumerate(parts):
-        if part is not None:
-            y, x = part.window
-            for row in range(y.start // TILE, (y.stop - 1) // TILE + 1):
-                for column in range(x.start // TILE, (x.stop - 1) // TILE + 1):
-                    tiles.setdefault((row, column), []).append(i)
-    blocks: dict[tuple[int, int], Array] = {}
-    size = int(first[-1])
-    dense = np.zeros((size, size)) if size <= 6000 else None
-    for (row, column), members in tiles.items():
-        top, left = row * TILE, column * TILE
-        height, width = min(TILE, ny - top), min(TILE, nx - left)
-        ids = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
-        stack = np.zeros((ids.size, height, width))
-        at = 0
-        for i in members:
-            part, own = parts[i], weighted[i]
-            assert part is not None
-            assert own is not None
-            y, x = part.window
-            y0, y1 = max(y.start, top), min(y.stop, top + height)
-            x0, x1 = max(x.start, left), min(x.stop, left + width)
-            stack[at : at + len(own), y0 - top : y1 - top, x0 - left : x1 - left] = own[
-                :, y0 - y.start : y1 - y.start, x0 - x.start : x1 - x.start
-            ]
-            at += len(own)
-        flat = stack.reshape(ids.size, -1)
-        product = flat @ flat.T
-        if dense is not None:
-            dense[np.ix_(ids, ids)] += product
-        else:
-            blocks[row, column] = product
-    if dense is not None:
-        return coo_array(dense)
-    rows, columns, data = [], [], []
-    for key, product in blocks.items():
-        ids = np.concatenate([np.arange(first[i], first[i + 1]) for i in tiles[key]])
-        rows.append(np.repeat(ids, ids.size))
-        columns.append(np.tile(ids, ids.size))
-        data.append(product.ravel())
-    joined = coo_array(
-        (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), (size, size)
-    )
-    joined.sum_duplicates()
-    return joined
+    return Covariance(arrays, rates, rate, variance, _alone(own), flux_correlation)
 
 
-def _invert(information: coo_array, first: NDArray[np.int_]) -> tuple[Array, coo_array]:
+def _levels(optics: Optics, arrays: SourceArrays, rates: Array, sky: float) -> tuple[Array, float]:
+    """Levels at which the windows of profiles end, and share of its peak where a star's does."""
+    size = np.pi * arrays.r_half**2 * (1 - arrays.ellipticity)
+    peak = 1 / (optics.point_area + 2 * size)
+    brightest = max(float(rates.max(initial=0.0)) * float(1 / optics.point_area), 1e-300)
+    share = float(np.clip(SKY_SHARE * sky / brightest, LOWEST_LEVEL, HIGHEST_LEVEL))
+    faint = np.divide(SKY_SHARE * sky, rates, out=np.full_like(rates, np.inf), where=rates > 0)
+    return np.clip(faint, LOWEST_LEVEL * peak, HIGHEST_LEVEL * peak), share
+
+
+def _invert(matrix: csr_array, first: Rows, arrays: SourceArrays) -> tuple[Array, coo_array]:
     """Variances of all parameters, and the correlations of the sources' rates."""
     size, n = int(first[-1]), first.size - 1
-    if not n:
-        return np.zeros(0), coo_array((0, 0))
-    matrix = information.tocsr()
     diagonal = matrix.diagonal()
     norm = np.divide(1.0, np.sqrt(diagonal), out=np.zeros(size), where=diagonal > 0)
     owner = np.repeat(np.arange(n), np.diff(first))
     entries = matrix.tocoo()
     coupling = np.abs(entries.data) * norm[entries.row] * norm[entries.col]
-    strong = coupling > COUPLED
-    graph = coo_array(
-        (np.ones(int(strong.sum())), (owner[entries.row[strong]], owner[entries.col[strong]])),
-        (n, n),
-    )
-    count, label = connected_components(graph, directed=False)
+    pairs = owner[entries.row], owner[entries.col]
+    _, label = connected_components(_graph(pairs, coupling > COUPLED, n), directed=False)
+    around = _graph(pairs, coupling > AROUND, n).tocsr()
+    is_rate = np.zeros(size, dtype=bool)
+    is_rate[first[:-1]] = True
     variance = np.full(size, np.inf)
     rows, columns, data = [], [], []
-    order = np.argsort(label, kind="stable")
-    for members in np.split(order, np.searchsorted(label[order], np.arange(1, count))):
+    for patch in _patches(label, arrays):
+        members = patch
+        if patch.size < np.count_nonzero(label == label[patch[0]]):
+            for _ in range(2):
+                members = np.union1d(members, around[members].indices)
         ids = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
         ids = ids[norm[ids] > 0]
         if not ids.size:
             continue
         scaled = matrix[ids][:, ids].toarray() * norm[ids] * norm[ids][:, None]
         inverse, infinite = _inverse(scaled)
-        variance[ids] = np.where(infinite, np.inf, np.diagonal(inverse) * norm[ids] ** 2)
-        is_rate = np.isin(ids, first[:-1])
-        which = owner[ids[is_rate]]
-        spread = inverse[np.ix_(is_rate, is_rate)]
+        wanted = np.isin(owner[ids], patch)
+        found = np.where(infinite, np.inf, np.diagonal(inverse) * norm[ids] ** 2)
+        variance[ids[wanted]] = found[wanted]
+        flux = is_rate[ids]
+        here = owner[ids[flux & wanted]]
+        spread = inverse[np.ix_(flux, flux)]
         deviation = np.sqrt(np.diagonal(spread))
-        rows.append(np.repeat(which, which.size))
-        columns.append(np.tile(which, which.size))
-        data.append((spread / deviation / deviation[:, None]).ravel())
+        spread = (spread / deviation / deviation[:, None])[wanted[flux]]
+        rows.append(np.repeat(here, spread.shape[1]))
+        columns.append(np.tile(owner[ids[flux]], here.size))
+        data.append(spread.ravel())
     if not data:
         return variance, coo_array((n, n))
     indices = (np.concatenate(rows), np.concatenate(columns))
     return variance, coo_array((np.concatenate(data), indices), (n, n))
+
+
+def _graph(pairs: tuple[Rows, Rows], chosen: NDArray[np.bool_], n: int) -> coo_array:
+    """Join sources, the nodes of a graph."""
+    return coo_array(
+        (np.ones(int(chosen.sum())), (pairs[0][chosen], pairs[1][chosen])), shape=(n, n)
+    )
+
+
+def _patches(label: NDArray[np.int32], arrays: SourceArrays) -> list[Rows]:
+    """Part sources by label, and those of a label with too many by place."""
+    order = np.argsort(label, kind="stable")
+    waiting = np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if order.size else []
+    patches = []
+    while waiting:
+        members = waiting.pop()
+        if members.size <= MOST:
+            patches.append(members)
+            continue
+        x, y = arrays.x[members], arrays.y[members]
+        across = x if np.ptp(x) > np.ptp(y) else y
+        halves = np.argsort(across, kind="stable")
+        waiting += [members[part] for part in np.array_split(halves, 2)]
+    return patches
 
 
 def _inverse(scaled: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -226,13 +194,12 @@ def _inverse(scaled: Array) -> tuple[Array, NDArray[np.bool_]]:
 
     A singular direction gets a variance that is large enough to rule the correlations.
     """
-    try:
-        inverse: Array = linalg.cho_solve(linalg.cho_factor(scaled), np.eye(len(scaled)))
-    except linalg.LinAlgError:
-        pass
-    else:
-        if np.diagonal(inverse).max() < 1e6:
-            return inverse, np.zeros(len(scaled), dtype=bool)
+    factor, failed = linalg.lapack.dpotrf(scaled)
+    if not failed:
+        inverse, failed = linalg.lapack.dpotri(factor)
+        if not failed and np.diagonal(inverse).max() < LARGE:
+            inverse = np.triu(inverse)
+            return inverse + np.triu(inverse, 1).T, np.zeros(len(scaled), dtype=bool)
     values, vectors = linalg.eigh(scaled)
     singular = values < SINGULAR
     infinite = (vectors[:, singular] ** 2).sum(axis=1) > INVOLVED
@@ -246,19 +213,22 @@ def _inverse(scaled: Array) -> tuple[Array, NDArray[np.bool_]]:
     return inverse, infinite
 
 
-def _alone(part: Derivatives | None, rate: float, sky: float) -> float:
-    if part is None:
-        return np.inf
-    images = _scaled(part, rate).reshape(len(part.images), -1)
-    expected = np.maximum(rate * images[0] + sky, 0.0)
-    expected = np.maximum(expected, DARKEST * expected.max())
-    if not expected.max() > 0:
-        return np.inf
-    matrix = (images / expected) @ images.T
-    norm = np.sqrt(np.diagonal(matrix))
-    used = norm > 0
-    if not used[0]:
-        return np.inf
-    scaled = matrix[np.ix_(used, used)] / norm[used] / norm[used][:, None]
-    inverse, infinite = _inverse(scaled)
-    return np.inf if infinite[0] else float(inverse[0, 0] / norm[0] ** 2)
+def _alone(information: list[Array]) -> Array:
+    """Variance of the first parameter from the information of each source alone, shape (n,)."""
+    result = np.full(len(information), np.inf)
+    sizes = np.array([len(matrix) for matrix in information])
+    for size in np.unique(sizes):
+        which = np.flatnonzero(sizes == size)
+        matrices = np.stack([information[i] for i in which])
+        diagonal = np.diagonal(matrices, axis1=1, axis2=2)
+        norm = np.divide(1.0, np.sqrt(diagonal), out=np.zeros_like(diagonal), where=diagonal > 0)
+        # what does not change the image is left out: alone, and of information 1
+        scaled = matrices * norm[:, None] * norm[:, :, None]
+        scaled[:, np.arange(size), np.arange(size)] = 1.0
+        values, vectors = np.linalg.eigh(scaled)
+        shares = vectors[:, 0] ** 2
+        singular = values < SINGULAR
+        inverse = np.divide(shares, values, out=np.zeros_like(shares), where=~singular).sum(axis=1)
+        known = (norm[:, 0] > 0) & ((shares * singular).sum(axis=1) <= INVOLVED)
+        result[which[known]] = inverse[known] * norm[known, 0] ** 2
+    return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from astropy.table import Table
 from .fits_header import wcs_header
 from .fits_io import IMAGES, SUFFIXES, scene_hdus
 from .fits_table import table_hdu
+from .monitoring_tasks import BATCH
 from .safe_write import check_target, replacing
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ def write_cube(
     *,
     coadd: bool = True,
     overwrite: bool = False,
+    progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """Write a sequence of exposures as a FITS cube; the whole cube is held in memory.
 
@@ -45,6 +48,9 @@ def write_cube(
         Whether the exposures of an epoch are added; see `Monitoring.stack`.
     overwrite : bool
         Whether an existing file may be replaced.
+    progress : callable, optional
+        Called with the numbers of finished and of all planes. These are then computed sixteen
+        at a time, and what more of them share is rendered again.
 
     Raises
     ------
@@ -83,7 +89,14 @@ def write_cube(
             "SEED": [str(one.seed) for one in ones],
         }
     )
-    cube = np.asarray(stack.compute())
+    cube = np.empty(stack.shape, stack.dtype)
+    tell = progress or (lambda done, total: None)
+    tell(0, len(cube))
+    # All at once renders nothing twice.
+    step = BATCH if progress else len(cube)
+    for start in range(0, len(cube), step):
+        cube[start : start + step] = stack[start : start + step].compute()
+        tell(min(start + step, len(cube)), len(cube))
     hdus = [
         fits.PrimaryHDU(cube, header),
         table_hdu(planes, "PLANES"),

@@ -15,6 +15,7 @@ from .fits_light_path import sky_description
 from .image_psf import ImagePSF
 from .observation import Observation
 from .psf import PSF, GaussianPSF, MoffatPSF, TelescopePSF
+from .sources import spectrum_texts
 
 if TYPE_CHECKING:
     from .exposure import Exposure
@@ -44,7 +45,7 @@ def observation_header(exposure: Exposure) -> fits.Header:
     header["WAVEMAX"] = (high, "[Angstrom] upper end of the band")
     header["EXPTIME"] = (observation.exposure, "[s] exposure time")
     header["OBSTYPE"] = ("SIMULATION", "no real observation")
-    header["CPSFLUX"] = (observation.cps_per_flux, "[ct/s] for 1 erg/s/cm2/A, with filters")
+    header["CPSFLUX"] = (observation.cps_per_flux, "[ct/s] 1 erg/s/cm2/A, flat, with filters")
     header["SKYRATE"] = (observation.sky_rate, "[ct/s/pixel] sky, with filters")
     header["SKYMODEL"] = sky_description(observation)
     header["DARKRATE"] = (observation.dark_rate, "[ct/s/pixel] of the detector itself")
@@ -69,6 +70,12 @@ def observation_header(exposure: Exposure) -> fits.Header:
     camera = observation.instrument
     if observation.psf_assumed and camera.psf_note:
         header["COMMENT"] = camera.psf_note
+    texts = spectrum_texts(exposure.sources)
+    if texts is not None and not np.isin(texts, ("", "flat")).all():
+        header["COMMENT"] = (
+            "CPSFLUX holds for a flat spectrum; sources of this exposure have others, which the "
+            "column spectrum of the extension SOURCES names."
+        )
     for number, one in enumerate(observation.filters, start=1):
         if not isinstance(one, Filter) and camera.is_illustrative(one) and camera.filter_note:
             header["COMMENT"] = f"FILTER{number}: {camera.filter_note}"

@@ -7,10 +7,12 @@ A file holds, in this order,
 * ``COUNTS``, where the image is another one;
 * ``EXPECTED``, the expected counts as 64-bit floats;
 * ``SOURCES``, the source table;
+* ``SPECTRA`` and ``SAMPLES``, where sources have spectra from files (`fits_spectra`);
 * ``OBSERVATION``, one row with the exact values of the observation, of which the header's
   cards are the readable copy;
 * ``INSTRUMENT``, all that is known of the camera, as the bytes of its TOML file;
 * ``PSF``, where an image serves as the PSF;
+* ``LIGHT1``, ``LIGHT2`` ..., the images that sources are;
 * ``FILTER1``, ``FILTER2``, where a curve of the user's serves as a filter.
 """
 
@@ -29,6 +31,8 @@ from .detector import Detector
 from .exposure import Exposure
 from .fits_header import observation_header, wcs_header
 from .fits_light_path import filter_hdus, sky_values, stored_filters, stored_sky
+from .fits_source_images import image_hdus, keep_images
+from .fits_spectra import spectrum_hdus, with_stored_spectra
 from .fits_table import open_fits, read_table, table_hdu
 from .image_psf import ImagePSF
 from .instrument import Instrument
@@ -126,7 +130,7 @@ def write_exposure(
 def scene_hdus(
     sources: Table, observation: Observation, seed: int, clipped: float = 0.0
 ) -> list[Any]:
-    """Make the extensions from which a scene can be told: sources, observation, seed, PSF, filters.
+    """Make the extensions from which a scene can be told: sources, observation and so on.
 
     Raises
     ------
@@ -134,14 +138,18 @@ def scene_hdus(
         If a column, the PSF or the sky cannot be stored; the message names it.
     """
     record = _record(observation, seed, clipped)
-    hdus = [table_hdu(sources, "SOURCES"), table_hdu(record, "OBSERVATION")]
-    text = instrument_text(observation.instrument).encode()
-    hdus.append(fits.ImageHDU(np.frombuffer(text, np.uint8), name="INSTRUMENT"))
+    camera = np.frombuffer(instrument_text(observation.instrument).encode(), np.uint8)
+    hdus = [
+        table_hdu(sources, "SOURCES"),
+        *spectrum_hdus(sources),
+        table_hdu(record, "OBSERVATION"),
+        fits.ImageHDU(camera, name="INSTRUMENT"),
+    ]
     if isinstance(observation.psf, ImagePSF):
         psf = observation.psf
         scale = fits.Header([("PIXELSCL", psf.pixel_scale, "[arcsec] spacing of the samples")])
         hdus.append(fits.ImageHDU(psf.array, scale, "PSF"))
-    return hdus + filter_hdus(observation)
+    return hdus + image_hdus(sources) + filter_hdus(observation)
 
 
 def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
@@ -165,7 +173,8 @@ def read_scene(hdus: fits.HDUList) -> tuple[QTable, Observation, int, float]:
         raise ValueError("the file was written by a newer napari-issis; update the program.")
     row = {name: record[name][0] for name in record.colnames}
     observation = _observation(row, hdus)
-    sources = read_table(hdus["SOURCES"])
+    sources = with_stored_spectra(read_table(hdus["SOURCES"]), hdus)
+    keep_images(hdus)
     check_sources(sources)
     return sources, observation, int(row["SEED"]), float(row["CLIPPED"])
 

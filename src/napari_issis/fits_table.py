@@ -21,6 +21,7 @@ from .reading import one_line, open_file
 
 # A packed file is unpacked in memory, up to so many bytes.
 MOST_UNPACKED = 256 * 2**20
+PIECE = 2**20
 GZIP = b"\x1f\x8b"
 ESCAPED = "ESCAPED"
 VARIABLE = re.compile(r"\d*[PQ]")
@@ -75,21 +76,25 @@ def open_fits(path: str | os.PathLike[str]) -> Iterator[fits.HDUList]:
 
 
 def _unpacked(file: BinaryIO, path: str | os.PathLike[str]) -> BinaryIO:
+    # Piece by piece: a single call of `decompress` holds what it unpacks twice.
     file.seek(0)
     inflate = zlib.decompressobj(wbits=31)
+    content = BytesIO()
     try:
-        content = inflate.decompress(file.read(), MOST_UNPACKED + 1)
+        while not inflate.eof and (packed := inflate.unconsumed_tail or file.read(PIECE)):
+            content.write(inflate.decompress(packed, PIECE))
+            if content.tell() > MOST_UNPACKED:
+                raise ValueError(
+                    f"{path} holds more than {MOST_UNPACKED} bytes; unpack it first with gunzip."
+                )
     except zlib.error as error:
         raise ValueError(
             f"{path} is not a FITS file: its gzip data are damaged ({one_line(error)})."
         ) from error
-    if len(content) > MOST_UNPACKED:
-        raise ValueError(
-            f"{path} holds more than {MOST_UNPACKED} bytes; unpack it first with gunzip."
-        )
     if not inflate.eof:
         raise ValueError(f"{path} is truncated: its gzip data have no end.")
-    return BytesIO(content)
+    content.seek(0)
+    return content
 
 
 def table_hdu(table: Table, name: str) -> fits.BinTableHDU:

@@ -66,8 +66,10 @@ class ImagePSF:
         *,
         pixel_scale: float | None = None,
         includes_pixel: bool = False,
+        hdu: int | str | None = None,
+        check: bool = True,
     ) -> ImagePSF:
-        """Read a PSF from the first image of a FITS file.
+        """Read a PSF from an image of a FITS file.
 
         Parameters
         ----------
@@ -75,40 +77,42 @@ class ImagePSF:
             The file.
         pixel_scale : float, optional
             Spacing of the samples in arcsec. By default that of the header: ``PIXELSCL`` or
-            ``PIXSCALE`` in arcsec, else its celestial WCS.
+            ``PIXSCALE`` in arcsec, else its WCS, whose pixels must be square.
         includes_pixel : bool
             As for the class.
+        hdu : int or str, optional
+            Number or name of the extension; by default the first with an image.
+        check : bool
+            Whether to refuse an image that is off its centre, bright at its border, negative or
+            undersampled, see `napari_issis.psf_checks.check_psf_image`.
 
         Raises
         ------
         ValueError
-            If the file holds no image, or no pixel scale is given or found.
+            If the file holds no image, no pixel scale is given or found, or the image is not
+            fit to be a PSF; the message says what is wrong and what to do.
         OSError
             If the file cannot be read.
         """
-        from astropy.wcs import WCS
-        from astropy.wcs.utils import proj_plane_pixel_scales
+        from .fits_image import read_image
+        from .fits_pixel_scale import stated_pixel_scale
+        from .psf_checks import check_psf_image
 
-        from .fits_table import open_fits
-
-        with open_fits(path) as hdus:
-            image = next((hdu for hdu in hdus if hdu.is_image and hdu.data is not None), None)
-            if image is None or image.data.ndim != 2:
-                raise ValueError("the file holds no two-dimensional image.")
-            header = image.header
-            data = np.asarray(image.data, dtype=np.float64)
-        if pixel_scale is None:
-            pixel_scale = header.get("PIXELSCL", header.get("PIXSCALE"))
-        if pixel_scale is None:
-            wcs = WCS(header)
-            if wcs.has_celestial:
-                pixel_scale = float(np.mean(proj_plane_pixel_scales(wcs.celestial)) * 3600)
-        if pixel_scale is None:
-            raise ValueError(
-                f"{path} does not say its pixel scale (PIXELSCL or a celestial WCS); "
-                "give pixel_scale in arcsec."
-            )
-        return cls(data, pixel_scale, includes_pixel)
+        image = read_image(path, hdu=hdu)
+        try:
+            if pixel_scale is None:
+                pixel_scale = stated_pixel_scale(image.header)
+            if pixel_scale is None:
+                raise ValueError(
+                    "it does not say its pixel scale (PIXELSCL or a WCS in angles); "
+                    "give pixel_scale in arcsec."
+                )
+            psf = cls(image.data, pixel_scale, includes_pixel)
+            if check:
+                check_psf_image(psf.array)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+        return psf
 
     @property
     def extent(self) -> float:

@@ -70,32 +70,15 @@ def lens_images(
     the quasar is exactly behind it, which is refused.
     """
     observation = Observation() if observation is None else observation
-    numbers = {
-        "einstein_radius": (einstein_radius, 0.0, np.inf),
-        "ellipticity": (ellipticity, -1e-300, 1.0),
-        "shear": (shear, -1e-300, 1.0),
-    }
-    for name, (value, low, high) in numbers.items():
-        if not low < float(value) < high:
-            raise ValueError(f"{name} is {value}; it must be above {max(low, 0):g}, below {high}.")
-    for name, value in (("pa", pa), ("shear_pa", shear_pa)):
-        if not np.isfinite(value):
-            raise ValueError(f"{name} is {value}; it must be a finite angle in degrees.")
-    try:
-        east, north = (float(offset) for offset in quasar)
-    except (TypeError, ValueError):
-        raise ValueError(f"quasar is {quasar!r}; give (east, north) in arcsec.") from None
-    if not (np.isfinite(east) and np.isfinite(north)):
-        raise ValueError(f"quasar is {quasar!r}; it must be finite.")
+    lens = IsothermalLens(einstein_radius, ellipticity, pa, shear, shear_pa)
+    east, north = source_offset(quasar)
     if ellipticity == shear == east == north == 0:
         raise ValueError(
             "the quasar lies exactly behind a circular lens: its image is a ring, not points; "
             "move the quasar, or give the lens an ellipticity or shear."
         )
     place = anchor(centre, observation)
-    x, y, magnification = _solve(
-        einstein_radius, 1 - ellipticity, pa, shear, shear_pa, (-east, north)
-    )
+    x, y, magnification = _solve(lens, (-east, north))
     if not x.size:
         raise ValueError("lenstronomy finds no image; move the quasar, or change the lens.")
     px, py = offsets_to_frame(-x, y, place, observation.pixel_scale)
@@ -105,34 +88,71 @@ def lens_images(
     return table
 
 
-def _solve(
-    radius: float, q: float, pa: float, shear: float, shear_pa: float, quasar: tuple[float, float]
-) -> tuple[Any, Any, Any]:
-    """Images (x to the west, y to the north, arcsec) and their signed magnifications."""
+def source_offset(offset: tuple[float, float], name: str = "quasar") -> tuple[float, float]:
+    """Return an offset (east, north) in arcsec, or raise a ValueError that names it."""
     try:
-        from lenstronomy.LensModel.lens_model import LensModel
-        from lenstronomy.LensModel.Solver.lens_equation_solver import LensEquationSolver
-        from lenstronomy.Util.param_util import phi_q2_ellipticity, shear_polar2cartesian
-    except ImportError:
-        raise ImportError(
-            'images of a model lens need lenstronomy: pip install "napari-issis[lens]"'
-        ) from None
-    # Their angles count from +x, counter-clockwise, as position angles do from north.
-    e1, e2 = phi_q2_ellipticity(np.radians(pa + 90), q)
-    gamma1, gamma2 = shear_polar2cartesian(np.radians(shear_pa + 90), shear)
-    model = LensModel(["SIE", "SHEAR"])
-    values = [
-        {"theta_E": radius, "e1": e1, "e2": e2, "center_x": 0.0, "center_y": 0.0},
-        {"gamma1": gamma1, "gamma2": gamma2, "ra_0": 0.0, "dec_0": 0.0},
-    ]
+        east, north = (float(value) for value in offset)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} is {offset!r}; give (east, north) in arcsec.") from None
+    if not (np.isfinite(east) and np.isfinite(north)):
+        raise ValueError(f"{name} is {offset!r}; it must be finite.")
+    return east, north
+
+
+class IsothermalLens:
+    """A singular isothermal ellipsoid with external shear, as lenstronomy has it.
+
+    The parameters are those of `lens_images`; a ValueError names one that is out of range.
+    Coordinates are x to the west and y to the north of the lens, arcsec.
+    """
+
+    def __init__(
+        self, einstein_radius: float, ellipticity: float, pa: float, shear: float, shear_pa: float
+    ) -> None:
+        numbers = {
+            "einstein_radius": (einstein_radius, 0.0, np.inf),
+            "ellipticity": (ellipticity, -1e-300, 1.0),
+            "shear": (shear, -1e-300, 1.0),
+        }
+        for name, (value, low, high) in numbers.items():
+            if not low < float(value) < high:
+                raise ValueError(
+                    f"{name} is {value}; it must be above {max(low, 0):g}, below {high}."
+                )
+        for name, value in (("pa", pa), ("shear_pa", shear_pa)):
+            if not np.isfinite(value):
+                raise ValueError(f"{name} is {value}; it must be a finite angle in degrees.")
+        try:
+            from lenstronomy.LensModel.lens_model import LensModel
+            from lenstronomy.Util.param_util import phi_q2_ellipticity, shear_polar2cartesian
+        except ImportError:
+            raise ImportError(
+                'images of a model lens need lenstronomy: pip install "napari-issis[lens]"'
+            ) from None
+        # Their angles count from +x, counter-clockwise, as position angles do from north.
+        e1, e2 = phi_q2_ellipticity(np.radians(pa + 90), 1 - ellipticity)
+        gamma1, gamma2 = shear_polar2cartesian(np.radians(shear_pa + 90), shear)
+        self.radius, self.shear = float(einstein_radius), float(shear)
+        self.model = LensModel(["SIE", "SHEAR"])
+        self.values = [
+            {"theta_E": self.radius, "e1": e1, "e2": e2, "center_x": 0.0, "center_y": 0.0},
+            {"gamma1": gamma1, "gamma2": gamma2, "ra_0": 0.0, "dec_0": 0.0},
+        ]
+
+
+def _solve(lens: IsothermalLens, quasar: tuple[float, float]) -> tuple[Any, Any, Any]:
+    """Images (x to the west, y to the north, arcsec) and their signed magnifications."""
+    from lenstronomy.LensModel.Solver.lens_equation_solver import LensEquationSolver
+
+    model, values = lens.model, lens.values
     solver = LensEquationSolver(model)
     # The closed solver finds nothing where lens or place is symmetric; the search always does.
     x, y = solver.image_position_from_source(
         *quasar,
         values,
         solver="lenstronomy",
-        min_distance=radius / 40,
-        search_window=(6 * radius + 2 * float(np.hypot(*quasar))) / (1 - shear),
+        min_distance=lens.radius / 40,
+        search_window=(6 * lens.radius + 2 * float(np.hypot(*quasar))) / (1 - lens.shear),
         precision_limit=1e-12,
         num_iter_max=200,
         magnification_limit=1e-3,

@@ -55,10 +55,8 @@ def count_rate_warnings(
     if rate.size == 0:
         return []
     own = Observation() if observation is None else observation
-    channel = own.channel_data
     detector = own.instrument.limits_note or f"the detector of {own.instrument.name}"
-    local_limit = channel.local_limit or inf
-    total_limit = channel.total_limit or inf
+    local_limit, total_limit = _limits(own)
     messages = []
     total = float(rate.sum() + background_rate * rate.size)
     if total > total_limit:
@@ -83,6 +81,32 @@ def count_rate_warnings(
     return messages
 
 
+def brief_warning(
+    rate: NDArray[np.float64], background_rate: float, sources: Table, observation: Observation
+) -> str:
+    """Say in a line or two what `count_rate_warnings` says; empty if no limit is broken.
+
+    It names the source with the brightest pixel, or the rate in all where no pixel is too
+    bright, and the cure. Parameters as there.
+    """
+    if rate.size == 0:
+        return ""
+    local_limit, total_limit = _limits(observation)
+    total = float(rate.sum() + background_rate * rate.size)
+    peak = float(rate.max()) + background_rate
+    if total <= total_limit and peak <= local_limit:
+        return ""
+    text = f"Too bright: {total:.3g} cps in all (limit {total_limit:.0e})."
+    if peak > local_limit:
+        rows = bright_sources(sources, observation, rate)
+        there = f", row {rows[0]}" if rows.size else ""
+        more = f" and {rows.size - 1} more" if rows.size > 1 else ""
+        text = f"Too bright: {peak:.3g} cps/px (limit {local_limit:g}){there}{more}."
+    excess = max(total / total_limit, peak / local_limit)
+    cure = _cure(excess, observation.filters, observation.instrument)
+    return f"{text} {cure.removeprefix('The neutral filter ')}"
+
+
 def warn_of_count_rates(
     rate: NDArray[np.float64], sources: Table, observation: Observation, *, stacklevel: int = 2
 ) -> None:
@@ -94,6 +118,12 @@ def warn_of_count_rates(
         rate, observation.background_rate, sources=sources, observation=observation
     ):
         warnings.warn(message, CountRateWarning, stacklevel=stacklevel + 1)
+
+
+def _limits(observation: Observation) -> tuple[float, float]:
+    """Count rates per pixel and in all above which the channel's detector is not linear, cps."""
+    channel = observation.channel_data
+    return channel.local_limit or inf, channel.total_limit or inf
 
 
 def _names(sources: Table, rows: NDArray[np.int64]) -> str:

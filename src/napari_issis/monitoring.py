@@ -14,25 +14,16 @@ from astropy.table import QTable, Table
 from numpy.typing import NDArray
 
 from .counts import checked_seed
-from .exposure import (
-    Exposure,
-    expected_of_rate,
-    expose,
-    noise_ready_rate,
-    same_table,
-    simulate,
-)
+from .exposure import Exposure, simulate
 from .light_curves import LightCurve, flux_factors
-from .limits import warn_of_count_rates
+from .monitoring_tasks import add_shifted, run, stack
 from .moved_frame import move_frame
 from .observation import Observation
+from .source_image import SourceImage, kept_images
 from .source_rates import sources_and_rates
 from .sources import FLUX_UNIT, check_sources
 
 Offset = tuple[float, float]
-IMAGES = ("counts", "expected")
-# Renders handed to dask at a time by `Monitoring.run`, so that progress can be told.
-BATCH = 16
 
 
 @dataclass(frozen=True)
@@ -71,6 +62,8 @@ class PlannedExposure:
     seed: int
     # Exposures with the same number share a render.
     render: int
+    # Those that sources are, for workers in other processes.
+    images: tuple[SourceImage, ...] = field(default=(), repr=False)
 
     @property
     def file_name(self) -> str:
@@ -112,7 +105,8 @@ class Monitoring:
     exposures: tuple[PlannedExposure, ...]
     seed: int
     tolerance: float | None
-    _token: str = field(default_factory=lambda: uuid4().hex, repr=False)
+    # Names the tasks of this plan among all that a cluster may hold.
+    token: str = field(default_factory=lambda: uuid4().hex, repr=False)
 
     def simulate(self, index: int) -> Exposure:
         """Simulate one exposure of the sequence, by its place in `exposures`."""
@@ -142,33 +136,13 @@ class Monitoring:
         ImportError
             If dask is not installed: ``pip install "napari-issis[monitor]"``.
         """
-        if image not in IMAGES:
-            raise ValueError(f"image is {image!r}; known: {', '.join(IMAGES)}.")
-        dask, da = _dask()
-        dtype = np.int64 if image == "counts" else np.float64
-        frames, rates = [], self._rates(dask)
-        for index, one in enumerate(self.exposures):
-            name = f"issis-{image}-{self._token}-{index}"
-            draw = dask.delayed(_image, pure=False)
-            frames.append(draw(rates[one.render], one, image, dask_key_name=name))
-        if coadd:
-            add = dask.delayed(_add, pure=False)
-            frames = [
-                add(
-                    [frames[index] for index in members],
-                    [self.exposures[index].shift for index in members],
-                    dask_key_name=f"issis-sum-{image}-{self._token}-{epoch}",
-                )
-                for epoch, members in enumerate(self._members())
-            ]
-        shape = self.observation.shape
-        return da.stack([da.from_delayed(frame, shape, dtype=dtype) for frame in frames])
+        return stack(self, image, coadd)
 
     def exposure_map(self, epoch: int) -> NDArray[np.float64]:
         """Exposure time of each pixel of a co-added epoch, seconds, shape (ny, nx)."""
-        ones = [self.exposures[index] for index in self._members()[epoch]]
+        ones = [self.exposures[index] for index in self.members()[epoch]]
         times = [np.full(self.observation.shape, one.observation.exposure) for one in ones]
-        return _add(times, [one.shift for one in ones])
+        return add_shifted(times, [one.shift for one in ones])
 
     def run(
         self,
@@ -201,38 +175,7 @@ class Monitoring:
         ImportError
             If dask is not installed.
         """
-        dask, _ = _dask()
-        place = Path(folder).resolve()
-        place.mkdir(parents=True, exist_ok=True)
-        paths = [place / one.file_name for one in self.exposures]
-        groups: dict[int, list[int]] = {}
-        for index, path in enumerate(paths):
-            if path.exists():
-                _check_finished(path, self.exposures[index])
-            else:
-                groups.setdefault(self.exposures[index].render, []).append(index)
-        total = len(paths)
-        done = total - sum(map(len, groups.values()))
-        tell = progress or (lambda done, total: None)
-        tell(done, total)
-        rates, write = self._rates(dask), dask.delayed(_write, pure=False)
-        # All exposures of a render go together, so that none is rendered twice.
-        renders = list(groups)
-        for start in range(0, len(renders), BATCH):
-            members = [i for render in renders[start : start + BATCH] for i in groups[render]]
-            tasks = [
-                write(
-                    rates[self.exposures[index].render],
-                    self.exposures[index],
-                    str(paths[index]),
-                    dask_key_name=f"issis-file-{self._token}-{index}",
-                )
-                for index in members
-            ]
-            dask.compute(*tasks)
-            done += len(members)
-            tell(done, total)
-        return paths
+        return run(self, Path(folder).resolve(), progress)
 
     def write_cube(
         self,
@@ -241,11 +184,12 @@ class Monitoring:
         *,
         coadd: bool = True,
         overwrite: bool = False,
+        progress: Callable[[int, int], None] | None = None,
     ) -> None:
         """Write the stack as a FITS cube; see `napari_issis.fits_cube.write_cube`."""
         from .fits_cube import write_cube
 
-        write_cube(self, path, image, coadd=coadd, overwrite=overwrite)
+        write_cube(self, path, image, coadd=coadd, overwrite=overwrite, progress=progress)
 
     def show(self, viewer: Any = None, *, image: str = "counts", coadd: bool = True) -> Any:
         """Show the stack in napari, with its slider over the epochs; returns the layer."""
@@ -253,22 +197,12 @@ class Monitoring:
 
         return show_monitoring(self, viewer, image=image, coadd=coadd)
 
-    def _members(self) -> list[list[int]]:
+    def members(self) -> list[list[int]]:
+        """Places in `exposures` of those of each epoch."""
         members: list[list[int]] = [[] for _ in self.epochs]
         for index, one in enumerate(self.exposures):
             members[one.epoch].append(index)
         return members
-
-    def _rates(self, dask: Any) -> dict[int, Any]:
-        render = dask.delayed(_rate, pure=False)
-        rates: dict[int, Any] = {}
-        for one in self.exposures:
-            if one.render not in rates:
-                name = f"issis-rate-{self._token}-{one.render}"
-                rates[one.render] = render(
-                    one.sources, one.observation, self.tolerance, dask_key_name=name
-                )
-        return rates
 
 
 def monitor(
@@ -331,6 +265,7 @@ def monitor(
         raise ValueError(f"there are {len(steps)} dithers and {exposures} exposures; give as many.")
     times = np.array([_time(one.time) for one in whole])
     factors = flux_factors(light_curves, delays, times, len(arrays))
+    images = tuple(kept_images(sources).values())
     planned: list[PlannedExposure] = []
     renders: dict[Any, int] = {}
     for number, epoch in enumerate(whole):
@@ -347,7 +282,7 @@ def monitor(
             own = np.random.SeedSequence(seed, spawn_key=(number, k)).generate_state(1, np.uint64)
             planned.append(
                 PlannedExposure(
-                    number, k, float(times[number]), step, seen, frame, int(own[0]), render
+                    number, k, float(times[number]), step, seen, frame, int(own[0]), render, images
                 )
             )
     return Monitoring(
@@ -393,73 +328,3 @@ def _offset(offset: Any) -> Offset:
     if not (np.isfinite(x) and np.isfinite(y)):
         raise ValueError(f"an offset is ({x}, {y}); it must be finite.")
     return x, y
-
-
-def _dask() -> tuple[Any, Any]:
-    try:
-        import dask
-        import dask.array as da
-    except ImportError:
-        raise ImportError(
-            'stacks of exposures need dask: pip install "napari-issis[monitor]"'
-        ) from None
-    return dask, da
-
-
-def _rate(
-    sources: QTable, observation: Observation, tolerance: float | None
-) -> tuple[NDArray[np.float64], float]:
-    rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
-    warn_of_count_rates(rate, sources, observation)
-    return rate, clipped
-
-
-def _exposed(rate: tuple[NDArray[np.float64], float], one: PlannedExposure) -> Exposure:
-    return expose(rate[0], one.sources, one.observation, seed=one.seed, clipped=rate[1])
-
-
-def _image(
-    rate: tuple[NDArray[np.float64], float], one: PlannedExposure, image: str
-) -> NDArray[Any]:
-    if image == "expected":
-        return expected_of_rate(rate[0], one.observation)
-    return _exposed(rate, one).counts
-
-
-def _write(rate: tuple[NDArray[np.float64], float], one: PlannedExposure, path: str) -> str:
-    try:
-        _exposed(rate, one).write(path)
-    except FileExistsError:
-        # A cluster may run a task again whose worker was lost after it had written.
-        _check_finished(Path(path), one)
-    return path
-
-
-def _add(frames: Sequence[NDArray[Any]], shifts: Sequence[tuple[int, int]]) -> NDArray[Any]:
-    """Add frames, each moved by whole pixels (x, y)."""
-    total = np.zeros_like(frames[0])
-    ny, nx = total.shape
-    for frame, (dx, dy) in zip(frames, shifts, strict=True):
-        if abs(dx) >= nx or abs(dy) >= ny:
-            continue
-        to = slice(max(dy, 0), ny + min(dy, 0)), slice(max(dx, 0), nx + min(dx, 0))
-        of = slice(max(-dy, 0), ny + min(-dy, 0)), slice(max(-dx, 0), nx + min(-dx, 0))
-        total[to] += frame[of]
-    return total
-
-
-def _check_finished(path: Path, one: PlannedExposure) -> None:
-    """Raise a ValueError if a file is not the planned exposure."""
-    from .fits_io import read_scene
-    from .fits_table import open_fits
-
-    try:
-        with open_fits(path) as hdus:
-            sources, observation, seed, _ = read_scene(hdus)
-    except ValueError as error:
-        raise ValueError(f"{path} is no finished exposure ({error}); remove it.") from error
-    same = seed == one.seed and observation == one.observation
-    if not (same and same_table(sources, one.sources)):
-        raise ValueError(
-            f"{path} holds an exposure of another sequence; choose another folder, or remove it."
-        )

@@ -14,7 +14,8 @@ from PIL.PngImagePlugin import PngInfo
 from .instruments import PIXEL_SCALE
 from .observation import Observation
 from .safe_write import replacing
-from .sources import check_sources
+from .source_image import kept_image
+from .sources import IMAGE, check_sources
 
 SUFFIXES = (".png",)
 SCALES = ("linear", "log", "sqrt")
@@ -28,6 +29,7 @@ ELLIPSE_COLORS = {
     "exponential": "yellow",
     "devaucouleurs": "orange",
     "sersic": "magenta",
+    IMAGE: "dodgerblue",
 }
 # The outline of a star with five points, one of them up, and its radius in pixels of the file.
 STAR_RADIUS = 6.0
@@ -80,6 +82,24 @@ def write_png(
     -----
     Scale, limits, colormap and zoom stand in the file as PNG text.
     """
+    picture, (low, high) = image_picture(
+        image, scale=scale, limits=limits, colormap=colormap, zoom=zoom
+    )
+    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
+    if isinstance(colormap, str):
+        text["Colormap"] = colormap
+    _save(picture, path, text | (words or {}), overwrite=overwrite)
+
+
+def image_picture(
+    image: ArrayLike,
+    *,
+    scale: str = "linear",
+    limits: tuple[float, float] | None = None,
+    colormap: str | NDArray[np.uint8] = "gray",
+    zoom: int = 1,
+) -> tuple[Image.Image, tuple[float, float]]:
+    """Return the picture that `write_png` writes, and the limits it has."""
     values = np.asarray(image, dtype=np.float64)
     if values.ndim != 2 or values.size == 0:
         raise ValueError(f"a PNG shows an image of two dimensions; this one's are {values.shape}.")
@@ -92,11 +112,7 @@ def write_png(
     brightness = np.rint(255 * _stretch(scale)(_normalised(values, low, high))).astype(np.uint8)
     magnified = np.flipud(brightness).repeat(zoom, axis=0).repeat(zoom, axis=1)
     colours = _colours(colormap) if isinstance(colormap, str) else colormap
-    picture = Image.fromarray(colours[magnified])
-    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
-    if isinstance(colormap, str):
-        text["Colormap"] = colormap
-    _save(picture, path, text | (words or {}), overwrite=overwrite)
+    return Image.fromarray(colours[magnified]), (low, high)
 
 
 def write_source_png(
@@ -143,6 +159,8 @@ def write_source_png(
     picture = Image.new("RGB", (nx * zoom, ny * zoom))
     draw = ImageDraw.Draw(picture)
     reach = np.maximum(arrays.r_half, STAR_RADIUS)
+    for row in np.flatnonzero(arrays.kind == IMAGE):
+        reach[row] *= np.hypot(*kept_image(str(arrays.image[row])).half_sizes)
     near = (np.abs(arrays.x - (nx - 1) / 2) <= nx / 2 + reach) & (
         np.abs(arrays.y - (ny - 1) / 2) <= ny / 2 + reach
     )
@@ -150,6 +168,8 @@ def write_source_png(
     for i, kind in enumerate(seen.kind):
         if kind == "point":
             outline = np.append(STAR, STAR[:1], axis=0) * STAR_RADIUS / zoom
+        elif kind == IMAGE:
+            outline = _rectangle(str(seen.image[i]), seen.r_half[i], seen.pa[i])
         else:
             outline = _ellipse(seen.r_half[i], seen.ellipticity[i], seen.pa[i], zoom)
         x = (seen.x[i] + outline[:, 0] + 0.5) * zoom - 0.5
@@ -157,6 +177,14 @@ def write_source_png(
         points = np.clip(np.rint(np.stack([x, y], axis=1)), -1e6, 1e6)
         draw.line([tuple(point) for point in points], fill=ELLIPSE_COLORS.get(kind, POINT_COLOR))
     _save(picture, path, {"Zoom": str(zoom)}, overwrite=overwrite)
+
+
+def _rectangle(image: str, r_half: float, pa: float) -> NDArray[np.float64]:
+    """Return the corners of an image about its centre, (x, y) in pixels, the first twice."""
+    half_y, half_x = (r_half * half for half in kept_image(image).half_sizes)
+    u, v = half_x * np.array([-1, 1, 1, -1, -1]), half_y * np.array([-1, -1, 1, 1, -1])
+    c, s = np.cos(np.radians(pa)), np.sin(np.radians(pa))
+    return np.stack([u * c - v * s, u * s + v * c], axis=1)
 
 
 def _ellipse(r_half: float, ellipticity: float, pa: float, zoom: int) -> NDArray[np.float64]:

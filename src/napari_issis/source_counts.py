@@ -9,10 +9,11 @@ from astropy.table import Table
 from numpy.typing import NDArray
 
 from .observation import Observation
+from .render.images import inverse_noise_area
 from .render.optics import Optics
 from .render.profiles import disc_transform, sersic_transform
 from .source_rates import sources_and_rates
-from .sources import SourceArrays
+from .sources import IMAGE, SourceArrays
 
 Array = NDArray[np.float64]
 
@@ -69,6 +70,9 @@ def noise_areas(optics: Optics, sources: SourceArrays) -> Array:
     angle = (np.arange(ANGLES) + 0.5) * (np.pi / ANGLES)
     extended = np.flatnonzero(sources.kind != "point")
     for i in extended:
+        if sources.kind[i] == IMAGE:
+            inverse[i] = inverse_noise_area(optics, sources.take(slice(i, i + 1)))
+            continue
         axis_ratio = 1 - sources.ellipticity[i]
         radius = sources.r_half[i] * np.hypot(np.cos(angle), axis_ratio * np.sin(angle))
         q = 2 * np.pi * np.outer(radius, k)

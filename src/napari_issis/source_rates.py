@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .extinction import EXTINCTION_KNOTS
 from .observation import Observation
 from .passband import Passband
-from .sources import SourceArrays, check_sources, spectra_of
+from .sources import SourceArrays, SpectraOfRows, check_columns, spectra_of
 from .spectra import FLAT, Spectrum, parse_spectrum
 
 Array = NDArray[np.float64]
@@ -44,9 +44,11 @@ def sources_and_rates(table: Table, observation: Observation) -> tuple[SourceArr
         If the table has an error, or a source no light in the band that its flux is the mean
         of; the message names row, column and value.
     """
-    pivot = flux_pivots(table, observation)
-    arrays = check_sources(table, pivot=pivot, pixel_scale=observation.pixel_scale)
-    return arrays, arrays.flux * rates_per_flux(table, observation)
+    # parsed once: 100,000 texts take as long as a small picture
+    spectra = spectra_of(table)
+    pivot = _pivots(spectra, table, observation)
+    arrays = check_columns(table, pivot=pivot, pixel_scale=observation.pixel_scale)
+    return arrays, arrays.flux * _rates(spectra, table, observation)
 
 
 def rates_per_flux(table: Table, observation: Observation) -> float | Array:
@@ -57,7 +59,10 @@ def rates_per_flux(table: Table, observation: Observation) -> float | Array:
     float or ndarray, shape (n,)
         One number where all spectra are flat.
     """
-    spectra = spectra_of(table)
+    return _rates(spectra_of(table), table, observation)
+
+
+def _rates(spectra: SpectraOfRows, table: Table, observation: Observation) -> float | Array:
     if all(spectrum == FLAT for spectrum, _ in spectra):
         return observation.cps_per_flux
     rates = np.full(len(table), observation.cps_per_flux)
@@ -79,7 +84,10 @@ def flux_pivots(table: Table, observation: Observation) -> float | Array:
         the wavelength at which the flux is given or, where it is the mean over the channel's
         band, the channel's own pivot wavelength. One number where all spectra are flat.
     """
-    spectra = spectra_of(table)
+    return _pivots(spectra_of(table), table, observation)
+
+
+def _pivots(spectra: SpectraOfRows, table: Table, observation: Observation) -> float | Array:
     if all(spectrum == FLAT for spectrum, _ in spectra):
         return observation.pivot
     pivots = np.full(len(table), observation.pivot)

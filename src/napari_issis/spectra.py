@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from math import isfinite
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .extinction import EXTINCTION_RANGE, transmitted
+from .spectrum_curves import curve_stamp, read_spectrum_curve
 
 Array = NDArray[np.float64]
 
@@ -277,7 +275,8 @@ class TableSpectrum(Spectrum):
     path : str
         An ECSV, CSV or FITS table with columns ``wavelength`` (with a unit) and ``flux``, per
         wavelength if it has no unit; see `napari_issis.filter_file.read_curve`. A relative path
-        is one from the working directory.
+        is one from the working directory. Where there is no such file, the curve that a FITS
+        file with a scene brought along serves instead.
 
     Raises
     ------
@@ -302,17 +301,12 @@ class TableSpectrum(Spectrum):
 
     @property
     def _curve(self) -> tuple[Array, Array]:
-        return _read(self.path, self.stamp)
+        return read_spectrum_curve(self.path, self.stamp)
 
     @property
     def stamp(self) -> tuple[int, ...]:
-        """Time of change and size of the file."""
-        try:
-            found = os.stat(self.path)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise ValueError(f"cannot read {self.path}: {reason}.") from error
-        return (found.st_mtime_ns, found.st_size)
+        """Time of change and size of the file, or a checksum of what is kept of it."""
+        return curve_stamp(self.path)
 
     def emitted(self, wavelength: Array) -> Array:
         """Flux density before redshift and dust."""
@@ -366,6 +360,31 @@ def parse_spectrum(text: str) -> Spectrum:
         return kind(**_arguments(match[2] or "", names))
     except ValueError as error:
         raise ValueError(f"{text[:60]!r}: {error}") from None
+
+
+def table_file(text: str) -> str | None:
+    """Return the file that the text of a spectrum names, which is not read; None for others."""
+    match = _CALL.fullmatch(text)
+    if match is None or match[1].lower() != TableSpectrum.name:
+        return None
+    return str(_arguments(match[2] or "", KINDS[TableSpectrum.name][1])["path"])
+
+
+def with_table_file(text: str, path: str) -> str:
+    """Return the text of a spectrum from a file with another file in its place."""
+    match = _CALL.fullmatch(text)
+    assert match is not None
+    options = _arguments(match[2] or "", KINDS[TableSpectrum.name][1])
+    del options["path"]
+    return (
+        ", ".join(
+            [
+                f'table("{path}"',
+                *(f"{name}={_text(float(value))}" for name, value in options.items()),
+            ]
+        )
+        + ")"
+    )
 
 
 def _arguments(text: str, names: tuple[tuple[str, str], ...]) -> dict[str, float | str]:
@@ -431,32 +450,6 @@ def _check(name: str, value: float, low: float, high: float, unit: str = "") -> 
 
 def _text(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
-
-
-@lru_cache(maxsize=32)
-def _read(path: str, stamp: tuple[int, ...]) -> tuple[Array, Array]:
-    """Wavelengths at rest, angstrom, and flux densities per wavelength of a file."""
-    from .filter_file import read_curve
-
-    try:
-        wavelength, flux = read_curve(Path(path), "flux")
-    except OSError as error:
-        raise ValueError(str(error)) from error
-    if wavelength.size < 2 or not np.all(np.isfinite(wavelength)):
-        raise ValueError(f"{path} needs two wavelengths or more, all finite.")
-    if wavelength[0] > wavelength[-1]:
-        wavelength, flux = wavelength[::-1].copy(), flux[::-1].copy()
-    if wavelength[0] <= 0 or not np.all(np.diff(wavelength) > 0):
-        raise ValueError(
-            f"{path}: the wavelengths must be above 0 and run in one direction; "
-            "sort the rows and remove doubles."
-        )
-    for value in flux[~(np.isfinite(flux) & (flux >= 0))][:1]:
-        raise ValueError(f"{path} has the flux {value:g}; it must be finite and 0 or more.")
-    if not flux.any():
-        raise ValueError(f"{path} holds no light: its flux is 0 throughout.")
-    # no unit is kept: sums over tiny numbers would lose digits
-    return wavelength, flux / flux.max()
 
 
 FLAT = Flat()

@@ -9,7 +9,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtTest import QTest
 from small_scene import SMALL, few_sources
 
-from napari_issis import simulate
+from napari_issis import Detector, simulate
 from napari_issis.plugin.brightness import SCALES, counts_at, scaled_colormap, stretched
 from napari_issis.plugin.display_form import DisplayForm
 from napari_issis.plugin.scene import open_scene
@@ -174,6 +174,53 @@ def test_magnitudes_beside_the_logarithm(scene, form):
     magnitude = -2.5 * np.log10(flux * pivot**2 / 2.99792458e18) - 48.6
     assert ticks[1.0] == f"{magnitude:.1f}"
     assert form.grab().width() > 0
+
+
+def test_magnitudes_are_of_the_sources_spectrum(scene, form):
+    """Catches a flat spectrum's magnitudes beside sources that have another, unsaid.
+
+    By hand: of F = (wavelength / 1500 A)^-6 the photons are
+    1500^6 (a^-4 - b^-4) / 4 / ((b^2 - a^2) / 2) of those of a flat spectrum of 1 over the band
+    from a to b.
+    """
+    low, high = 1850.0, 3200.0
+    form.scale.value = "log"
+    table = scene.sources
+    table["spectrum"] = ["powerlaw(-6, at=1500)"] * 4
+    scene.sources = table
+    scene.wait()
+    scene.counts.set_limits((1.0, 1000.0))
+    rate = (1000.0 - scene.exposure.background) / 50.0
+    photons = 1500.0**6 * (low**-4 - high**-4) / 4 / (0.5 * (high**2 - low**2))
+    flux = rate / (1.14e17 * photons * 0.036**2)
+    magnitude = -2.5 * np.log10(flux * 1500.0**2 / 2.99792458e18) - 48.6
+    assert dict(form.bar.magnitude_ticks())[1.0] == f"{magnitude:.1f}"
+    assert "powerlaw(-6, at=1500)" in form.bar.toolTip()
+    assert form.units.text().endswith("AB mag/″²")
+    table["spectrum"][0] = "flat"
+    scene.sources = table
+    scene.wait()
+    scene.counts.set_limits((1.0, 1000.0))
+    flux = rate / (1.14e17 * 0.036**2)
+    pivot = np.sqrt(0.5 * (high**2 - low**2) / np.log(high / low))
+    magnitude = -2.5 * np.log10(flux * pivot**2 / 2.99792458e18) - 48.6
+    assert dict(form.bar.magnitude_ticks())[1.0] == f"{magnitude:.1f}"
+    assert form.units.text().endswith("AB mag/″² *")
+    assert "different ones" in form.units.toolTip()
+
+
+def test_magnitudes_are_of_the_light_before_coincidence_loss(scene, form):
+    """Catches surface brightnesses that a dead time makes fainter: 20 cps of 33 at 0.02 s."""
+    form.scale.value = "log"
+    scene.observation = SMALL.replace(detector=Detector(0.02), background=1.0)
+    scene.wait()
+    scene.counts.set_limits((1.0, 1000.0))
+    flux = (20.0 / (1 - 20.0 * 0.02) - 1.0) / (1.14e17 * 0.036**2)
+    pivot = scene.observation.channel_data.pivot
+    magnitude = -2.5 * np.log10(flux * pivot**2 / 2.99792458e18) - 48.6
+    assert dict(form.bar.magnitude_ticks())[1.0] == f"{magnitude:.1f}"
+    scene.counts.set_limits((1.0, 3000.0))
+    assert 1.0 not in dict(form.bar.magnitude_ticks())
 
 
 def test_an_empty_scene(viewer):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -264,9 +265,9 @@ def test_the_instrument_form_follows_scripts_only_while_shown(scene, instrument)
     assert instrument.exposure.number == 7.0
     instrument.resume()
     assert instrument.exposure.number == 8.0
-    assert "given by a script" in instrument.psf.text()
+    assert "given by a script" in instrument.psf.text.text()
     scene.observation = SMALL.replace(psf=None)
-    assert "assumed" in instrument.psf.text()
+    assert "assumed" in instrument.psf.text.text()
     instrument.pause()
 
 
@@ -274,7 +275,13 @@ def test_count_rate_warnings_are_shown_in_place(scene, instrument):
     instrument.resume()
     scene.add(source("point", 30, 30, flux=1e-12))
     scene.wait()
-    assert "linear" in instrument.warning.text()
+    assert instrument.warning.text().startswith("Too bright: ")
+    assert "row 4" in instrument.warning.text()
+    assert len(instrument.warning.text()) < 120
+    # at length where the pointer rests
+    for sentence in scene.picture.warnings:
+        assert escape(sentence) in instrument.warning.toolTip()
+    assert "linear" in instrument.warning.toolTip()
     assert not instrument.warning.isHidden()
     scene.sources = few_sources()[:0]
     scene.wait()

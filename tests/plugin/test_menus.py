@@ -58,12 +58,13 @@ def told():
     return [str(note.message) for note in notification_manager.records]
 
 
-def answer_dialog(monkeypatch, path, kind=None):
-    """Let napari's file dialogs return a file, the file type chosen by words in its name."""
+def answer_dialog(monkeypatch, path):
+    """Let napari's file dialogs return a file, if they offer its type."""
 
     def save(*args, **options):
         kinds = options["filter"].split(";;")
-        return str(path), next((one for one in kinds if kind and kind in one), kinds[0])
+        fitting = [kind for kind in kinds if f"*{path.suffix})" in kind]
+        return (str(path), fitting[0]) if fitting else ("", "")
 
     monkeypatch.setattr(QFileDialog, "getSaveFileName", save)
     monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *a, **o: ([str(path)], ""))
@@ -102,7 +103,7 @@ def test_save_selected_layers_and_open_file(window, tmp_path, monkeypatch, qtbot
     scene.wait()
     window.layers.selection = {scene.counts.layer}
     path = tmp_path / "through the menu.fits"
-    answer_dialog(monkeypatch, path, "FITS")
+    answer_dialog(monkeypatch, path)
     action(window, "File", "Save Selected Layers...").trigger()
     assert path.exists(), told()
     saved = Exposure.read(path)
@@ -124,7 +125,7 @@ def test_an_ordinary_image_layer_is_saved(window, tmp_path, monkeypatch):
     """Catches a writer for our own image only."""
     layer = window.add_image(np.arange(12.0).reshape(3, 4), name="plain")
     window.layers.selection = {layer}
-    answer_dialog(monkeypatch, tmp_path / "plain.fits", "FITS")
+    answer_dialog(monkeypatch, tmp_path / "plain.fits")
     action(window, "File", "Save Selected Layers...").trigger()
     assert np.array_equal(fits.getdata(tmp_path / "plain.fits"), layer.data)
 
@@ -134,7 +135,7 @@ def test_an_error_of_saving_is_one_sentence(window, tmp_path, monkeypatch, qtbot
     scene = open_scene(few_sources(), SMALL, viewer=window)
     scene.wait()
     window.layers.selection = {scene.counts.layer}
-    answer_dialog(monkeypatch, tmp_path / "missing" / "x.fits", "FITS")
+    answer_dialog(monkeypatch, tmp_path / "missing" / "x.fits")
     with qtbot.capture_exceptions() as caught:
         action(window, "File", "Save Selected Layers...").trigger()
     words = [f"{kind.__name__}: {error}" for kind, error, _ in caught]

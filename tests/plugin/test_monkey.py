@@ -243,6 +243,9 @@ class Monkey:
             layers = self.scene.layers
             self.scene.viewer.layers.remove(layers[int(self.rng.integers(len(layers)))])
 
+    def do_restore(self):
+        self.scene.restore()
+
     def do_edit_features(self):
         if self.ellipses is not None and len(self.ellipses.data):
             features = self.ellipses.features.copy()

@@ -157,7 +157,7 @@ def shown(form):
 
 def test_rows_are_shown_where_they_apply(form):
     """Catches rows that take room though they have no effect, and rows that are missing."""
-    always = {"Units", "Mode"}
+    always = {"Units", "Mode", "Spectrum"}
     form.kind.value = "point"
     flux = "F (erg/s/cm²/Å)"
     assert shown(form) == always | {"Kind", "x, y (px)", flux}

@@ -10,6 +10,9 @@ from qtpy.QtGui import QImage, QPainter, QPaintEvent, QPalette
 from qtpy.QtWidgets import QSizePolicy, QWidget
 
 from ..photometry import surface_brightness
+from ..source_rates import cps_per_flux, flux_pivot
+from ..sources import shared_spectrum
+from ..spectra import FLAT, Spectrum
 from .brightness import counts_at, stretched
 from .scene import Scene
 
@@ -31,7 +34,20 @@ class ColorBar(QWidget):  # type: ignore[misc]
         super().__init__()
         self.scene = scene
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setToolTip("Counts per pixel; below, on the logarithmic scale, AB mag arcsec⁻²")
+        self._spectrum: tuple[Any, Spectrum | None] = (None, FLAT)
+        self.show_scale()
+
+    @property
+    def spectrum(self) -> Spectrum | None:
+        """The spectrum of all sources; None if they have different ones."""
+        table = self.scene.editor.sources
+        if self._spectrum[0] is not table:
+            try:
+                self._spectrum = table, shared_spectrum(table)
+            except ValueError:
+                # a file that is gone
+                self._spectrum = table, None
+        return self._spectrum[1]
 
     @property
     def has_magnitudes(self) -> bool:
@@ -45,6 +61,14 @@ class ColorBar(QWidget):  # type: ignore[misc]
 
     def show_scale(self, event: Any = None) -> None:
         """Show the present limits, scale and colours."""
+        self.setToolTip(
+            "Counts per pixel; below, on the logarithmic scale, AB mag arcsec⁻² above the sky, of "
+            + (
+                "a flat spectrum (*: the sources have different ones)"
+                if self.spectrum is None
+                else f"the sources' spectrum, {self.spectrum}"
+            )
+        )
         self.setFixedHeight(self.sizeHint().height())
         self.update()
 
@@ -63,15 +87,20 @@ class ColorBar(QWidget):  # type: ignore[misc]
         return [(float(p), f"{v:.6g}") for p, v in zip(places[inside], values[inside], strict=True)]
 
     def magnitude_ticks(self) -> list[tuple[float, str]]:
-        """Places and labels of surface brightnesses, AB mag arcsec-2, above the sky."""
+        """Places and labels of surface brightnesses, AB mag arcsec-2, above the sky.
+
+        They are those of the sources' spectrum, or of a flat one if there are several.
+        """
+        spectrum = self.spectrum or FLAT
         counts, observation = self.scene.counts, self.scene.observation
         brightness = np.linspace(0.0, 1.0, 6)
         shown = counts_at(counts.effective_scale, brightness, counts.limits, counts.background)
-        rate = (shown - counts.background) / observation.exposure
+        received = observation.detector.received(np.asarray(shown / observation.exposure))
+        rate = received - observation.background_rate
         magnitude = surface_brightness(
             rate,
-            cps_per_flux=observation.cps_per_flux,
-            pivot=observation.pivot,
+            cps_per_flux=cps_per_flux(spectrum, observation),
+            pivot=flux_pivot(spectrum, observation),
             pixel_scale=observation.pixel_scale,
         )
         return [

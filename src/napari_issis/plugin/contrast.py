@@ -33,9 +33,13 @@ def contrast_limits(
     (float, float)
         Lower and upper limit; the upper one is at least 1 count above the lower.
     """
-    bright = counts[counts > background + 5 * np.sqrt(background) + 1]
+    least = background + 5 * np.sqrt(background) + 1
+    # a part is enough where it is large; an odd step goes through all columns
+    part = counts.ravel()[:: (counts.size // (4 * ENOUGH)) | 1]
+    bright = part[part > least]
+    if bright.size < ENOUGH // 2 and part.size < counts.size:
+        bright = counts[counts > least]
     chosen = bright if bright.size else counts.ravel()
-    # a part is enough where the whole takes a quarter of a second
     chosen = chosen[:: 1 + chosen.size // ENOUGH]
     upper = float(np.percentile(chosen, PERCENTILES[scale])) if chosen.size else 1.0
     lower = 0.0

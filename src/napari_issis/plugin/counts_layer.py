@@ -127,6 +127,9 @@ class CountsLayer:
         frame = layer.bounding_box
         frame.visible, frame.points, frame.line_color = True, False, styles.FRAME_COLOR
         self.layer = layer
+        if picture is not None:
+            self.set_limits(None)
+            self._rescale = self._always = False
         return layer
 
     def rescale(self, *, always: bool = False) -> None:
@@ -135,9 +138,10 @@ class CountsLayer:
         self._always = self._always or always
 
     def show(self, picture: Picture) -> None:
-        """Show a picture."""
-        assert self._layer is not None
+        """Show a picture, or keep it for a layer that comes back."""
         self._picture = picture
+        if self._layer is None:
+            return
         exposure = picture.exposure
         self._layer.data = self._data(exposure)
         if not picture.final:

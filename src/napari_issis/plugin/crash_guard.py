@@ -43,7 +43,7 @@ class CrashGuard(QWidget):  # type: ignore[misc]
         self.forget.clicked.connect(self._forget)
         self._left: list[CrashedScene] = []
         self._file: Autosave | None = None
-        self._saved = scene.editor.version
+        self._saved = self._version
         self._jobs = LatestWins(lambda _: None, self._failed)
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
@@ -62,11 +62,16 @@ class CrashGuard(QWidget):  # type: ignore[misc]
     def save(self) -> None:
         """Write the scene to its file, in another thread."""
         scene, file = self.scene, self._file
-        if file is None or scene.editor.version == self._saved:
+        if file is None or self._version == self._saved:
             return
-        self._saved = scene.editor.version
+        self._saved = self._version
         sources, observation, seed = scene.sources, scene.observation, scene.seed
         self._jobs.request(lambda: file.write(sources, observation, seed))
+
+    @property
+    def _version(self) -> tuple[Any, ...]:
+        """What is kept: the sources by their version, and what they are observed with."""
+        return self.scene.editor.version, self.scene.observation, self.scene.seed
 
     def end(self) -> None:
         """Remove the file: the session ends well."""
@@ -76,7 +81,7 @@ class CrashGuard(QWidget):  # type: ignore[misc]
             self._file.remove()
 
     def _edited(self, event: Any = None) -> None:
-        if self.scene.editor.version != self._saved and not self._timer.isActive():
+        if self._version != self._saved and not self._timer.isActive():
             self._timer.start()
 
     def _failed(self, error: BaseException) -> None:

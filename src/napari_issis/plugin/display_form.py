@@ -52,7 +52,6 @@ class DisplayForm(Form):
         self.add("&Brightness", self.scale)
         self.add("Li&mits (ct)", self.low, self.high, self.auto)
         self.units = QLabel()
-        self.units.setToolTip(self.bar.toolTip())
         self.add_native(self.units, self.bar)
         self.shows.changed.connect(self._set_shows)
         self.scale.changed.connect(self._set_scale)
@@ -88,7 +87,9 @@ class DisplayForm(Form):
             if not field.native.hasFocus():
                 field.number = float(f"{value:.4g}")
         self.bar.show_scale()
-        self.units.setText("\nct/px\nAB mag/″²" if self.bar.has_magnitudes else "\nct/px")
+        self.units.setToolTip(self.bar.toolTip())
+        magnitudes = "AB mag/″²" if self.bar.spectrum else "AB mag/″² *"
+        self.units.setText(f"\nct/px\n{magnitudes}" if self.bar.has_magnitudes else "\nct/px")
 
     def _listen(self, layer: Any) -> None:
         if self._layer is layer:

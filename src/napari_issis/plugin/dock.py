@@ -25,10 +25,12 @@ from .crash_guard import CrashGuard
 from .display_form import DisplayForm
 from .instrument_form import InstrumentForm
 from .keys import show_keys
+from .missing_layers import MissingLayers
 from .panels import LIST_NAME, toggle_panel
 from .png_menu import PngMenu
 from .progress_row import ProgressRow
 from .scene import open_scene
+from .sheet_dialog import SheetDialog
 from .source_form import SourceForm
 from .source_list import SourceList
 from .view_form import ViewForm
@@ -68,6 +70,9 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             text="Sav&e FITS…", tooltip="Save the exposure as a FITS file: whole, or one image"
         )
         self.save.changed.connect(self.save_fits)
+        self.sheet = _tool("Shee&t…", self.ask_sheet)
+        self.sheet.setToolTip("Write a proposal sheet: both channels, forecasts, commands")
+        self._sheet_dialog: SheetDialog | None = None
         self.form = next(iter(FITS_FORMS))
         tools = QHBoxLayout()
         tools.setContentsMargins(4, 0, 4, 0)
@@ -101,6 +106,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         layout.setContentsMargins(0, 0, 0, 4)
         self.guard = CrashGuard(self.scene)
         layout.addWidget(self.guard)
+        self.missing = MissingLayers(self.scene)
+        layout.addWidget(self.missing)
         layout.addWidget(self.pages)
         self.progress = ProgressRow(self.scene)
         layout.addWidget(self.progress)
@@ -108,6 +115,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         buttons.setContentsMargins(4, 0, 4, 0)
         buttons.addWidget(self.sources.button.native)
         buttons.addWidget(self.save.native)
+        buttons.addWidget(self.sheet)
         layout.addLayout(buttons)
         layout.addLayout(tools)
         self.setMinimumWidth(330)
@@ -126,6 +134,13 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             show_error(str(error))
         else:
             show_info(f"Saved {target}")
+
+    def ask_sheet(self) -> None:
+        """Open the dialog of the proposal sheet."""
+        self.instrument.apply_typed()
+        if self._sheet_dialog is None:
+            self._sheet_dialog = SheetDialog(self.scene, self)
+        self._sheet_dialog.open_for_selection()
 
     def toggle_list(self) -> None:
         """Show or hide the list of sources."""
@@ -164,6 +179,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.display.resume()
             self.view.resume()
             self.progress.resume()
+            self.missing.resume()
         super().showEvent(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -176,6 +192,7 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             self.display.pause()
             self.view.pause()
             self.progress.pause()
+            self.missing.pause()
         super().hideEvent(event)
 
 

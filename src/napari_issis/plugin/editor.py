@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..exposure import same_table
 from ..observation import Observation
+from ..psf_blurs import blurs_of, with_blurs
 from ..source_rates import flux_pivots
 from ..sources import (
     DEFAULT_ELLIPTICITY,
@@ -116,6 +117,21 @@ class SourceEditor:
             self._bury(gone)
             self._set(self.sources[~gone], self.source_id[~gone])
 
+    def with_lost(self) -> SourceState:
+        """Return the sources with those that went with the layers that are missing.
+
+        They have their old places among the others.
+        """
+        table, source_id = self.sources, self.source_id
+        for view in self.views:
+            if view.layer is None and view.lost is not None:
+                rows, ids = view.lost
+                table = join(table, rows, pivot=flux_pivots(rows, self.observation))
+                source_id = np.concatenate([source_id, ids])
+        # ids go up from row to row
+        order = np.argsort(source_id)
+        return SourceState(table[order], source_id[order])
+
     def change(self, table: QTable) -> None:
         """Put a master table with the same rows, edited, in the table's place; `write` shows it."""
         self._set(table, self.source_id)
@@ -123,16 +139,19 @@ class SourceEditor:
     def undo(self) -> bool:
         """Take the last edit back; False if there is none, or while the mouse holds a source."""
         self.end_nudge()
-        return self.held is None and self._restore(self.history.undo())
+        return self.held is None and self.restore(self.history.undo())
 
     def redo(self) -> bool:
         """Do again what was undone; False if there is nothing."""
         self.end_nudge()
-        return self.held is None and self._restore(self.history.redo())
+        return self.held is None and self.restore(self.history.redo())
 
-    def _restore(self, state: SourceState | None) -> bool:
+    def restore(self, state: SourceState | None) -> bool:
+        """Put a state in the place of the present one; False if there is none."""
         if state is None:
             return False
+        if state.blurs is not None and blurs_of(self.observation) is not None:
+            self.observation = with_blurs(self.observation, **state.blurs)
         gone = np.isin(self.source_id, state.source_id, invert=True)
         self._bury(gone)
         self._set(state.sources, state.source_id)
@@ -166,6 +185,12 @@ class SourceEditor:
             self._nudging, self.held, self._untidy = False, None, True
             self.take_over()
 
+    def observe(self, observation: Observation) -> None:
+        """Take over another set-up; a change of its PSF's blurs is a step of the history."""
+        self.observation = observation
+        if self.held is None:
+            self._note()
+
     def _set(self, table: QTable, source_id: Ids) -> None:
         self.end_nudge()
         self.held = None
@@ -179,7 +204,7 @@ class SourceEditor:
         self.history.note(self._state())
 
     def _state(self) -> SourceState:
-        return SourceState(self.sources, self.source_id)
+        return SourceState(self.sources, self.source_id, blurs_of(self.observation))
 
     def _bury(self, gone: NDArray[np.bool_]) -> None:
         """Keep rows that go, for those that come back by paste."""
@@ -292,7 +317,7 @@ class SourceEditor:
         for view in self.views:
             if view.layer is layer:
                 self.take_over()
-                view.layer = None
+                view.layer, view.lost = None, None
                 self.held = None
                 self._changed()
 
@@ -368,6 +393,7 @@ class SourceEditor:
         mine = np.isin(self.source_id, view.source_id)
         if view.layer is None:
             self._bury(mine)
+            view.lost = self.sources[mine], self.source_id[mine]
             self.sources, self.source_id = self.sources[~mine], self.source_id[~mine]
             view.forget()
             return
@@ -485,8 +511,13 @@ class SourceEditor:
 
     def _places(self, ids: Any) -> NDArray[np.intp]:
         """Rows of the table with these ids, -1 where there is none."""
-        known = {int(value): place for place, value in enumerate(self.source_id)}
-        return np.array([known.get(int(value), -1) for value in ids], dtype=np.intp)
+        wanted = np.asarray(ids, dtype=np.int64)
+        if not self.source_id.size:
+            return np.full(wanted.shape, -1, dtype=np.intp)
+        order = np.argsort(self.source_id, kind="stable")
+        at = np.searchsorted(self.source_id, wanted, sorter=order)
+        places = order[np.minimum(at, order.size - 1)]
+        return np.where(self.source_id[places] == wanted, places, -1)
 
     def _new_ids(self, count: int) -> Ids:
         first = self._last_id + 1

@@ -42,7 +42,7 @@ def exposure_layers(exposure: Exposure) -> list[LayerDataTuple]:
     }
     corners = list(shapes_data(sources[~point]))
     if corners:
-        ellipses["shape_type"] = "ellipse"
+        ellipses["shape_type"] = styles.shape_types(sources["kind"][~point])
         ellipses["edge_color"] = styles.edge_colors(sources["kind"][~point])
     else:
         ellipses["ndim"] = 2

@@ -1,4 +1,4 @@
-"""Undo and redo: the source tables that were, and those that were undone."""
+"""Undo and redo: the source tables and PSFs that were, and those that were undone."""
 
 from __future__ import annotations
 
@@ -19,12 +19,28 @@ LEAST_STEPS = 50
 
 @dataclass(frozen=True, eq=False)
 class SourceState:
-    """A source table, which nobody changes in place, and the ids of its rows."""
+    """What can be undone.
+
+    Parameters
+    ----------
+    sources : astropy.table.QTable
+        The source table, which nobody changes in place.
+    source_id : ndarray of int
+        The ids of its rows.
+    blurs : dict, optional
+        What the PSF has in place of the channel's own, see `napari_issis.psf_blurs.blurs_of`.
+    """
 
     sources: QTable
     source_id: NDArray[np.int64]
+    blurs: dict[str, float] | None = None
 
     def same(self, other: SourceState) -> bool:
+        """Whether both hold the same rows, and the same blurs as far as they are known."""
+        known = self.blurs is not None and other.blurs is not None
+        return (not known or self.blurs == other.blurs) and self.same_rows(other)
+
+    def same_rows(self, other: SourceState) -> bool:
         """Whether both hold the same rows."""
         return np.array_equal(self.source_id, other.source_id) and (
             self.sources is other.sources or same_table(self.sources, other.sources)
@@ -91,6 +107,8 @@ class History:
 
 def describe(before: SourceState, after: SourceState) -> str:
     """Say what leads from one state to the next, such as ``move 1 source``."""
+    if before.same_rows(after):
+        return "change the PSF"
     added = int(np.isin(after.source_id, before.source_id, invert=True).sum())
     removed = int(np.isin(before.source_id, after.source_id, invert=True).sum())
     if added and removed:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from html import escape
 from typing import Any
 
 from magicgui.widgets import CheckBox, ComboBox, PushButton
@@ -13,15 +14,18 @@ from ..filters import Filter
 from ..instrument import Instrument
 from ..instruments import INSTRUMENTS, instrument_named
 from ..observation import Observation, passes
+from ..psf_blurs import with_blurs_of
 from ..sky import SKIES
 from .form import Form
 from .number_field import NumberField, SeedField
 from .position_field import PositionField
+from .psf_rows import PsfRows
 from .scene import Scene
 
 # What the last entry of a wheel stands for.
 LOAD = "load"
 # Black on amber is readable in napari's dark and light themes.
+WARNING_NOTE = "The limits are those of HST ACS/SBC, the nearest analogue."
 WARNING_STYLE = "color: #111; background: #ffcf5c; padding: 3px; border-radius: 3px;"
 
 
@@ -90,8 +94,8 @@ class InstrumentForm(Form):
         )
         self.add("Detector", self.loss, self.rollover)
         self.sky = self.add_text("Background with the filters in place, by parts")
-        self.psf = self.add_text(scene.observation.instrument.psf_note)
-        self.warning = self.add_text("Count-rate limits of the camera's detector")
+        self.psf = PsfRows(self, scene)
+        self.warning = self.add_text(WARNING_NOTE)
         self.warning.setStyleSheet(WARNING_STYLE)
         self._labelled: tuple[Any, ...] = ()
         self._shown: tuple[Any, ...] = (
@@ -131,6 +135,7 @@ class InstrumentForm(Form):
         """Stop following the scene."""
         self.scene.events.observation.disconnect(self.show_observation)
         self.scene.events.picture.disconnect(self.show_warnings)
+        self.psf.pause()
 
     def show_observation(self, event: Any = None) -> None:
         """Show the scene's observation and seed."""
@@ -144,7 +149,6 @@ class InstrumentForm(Form):
                 (self.channel, _channels(observation)),
             ):
                 _offer(widget, choices)
-            self.psf.setToolTip(camera.psf_note)
         for widget, choices in (
             (self.camera, _cameras(observation)),
             (self.wheel1, _filters(observation)),
@@ -187,22 +191,23 @@ class InstrumentForm(Form):
         if seed != self.scene.seed:
             self.seed.number = self.scene.seed
         self.sky.setText(_sky_text(observation))
-        self.psf.setText(
-            _assumed_psf_text(observation)
-            if observation.psf_assumed
-            else f"PSF: {type(observation.psf).__name__}, given by a script"
-        )
+        self.psf.show_observation()
 
     def show_warnings(self, event: Any = None) -> None:
         """Show the count-rate limits that the present picture breaks."""
         picture = self.scene.picture
-        text = "\n".join(() if picture is None else picture.warnings)
+        text = "" if picture is None else picture.warning
         self.warning.setText(text)
+        if picture is not None:
+            lines = (*picture.warnings, WARNING_NOTE)
+            self.warning.setToolTip("".join(f"<p>{escape(line)}</p>" for line in lines))
         self.show_row(self.warning, bool(text))
 
     def _apply(self, **change: Any) -> None:
+        before = self.scene.observation
         try:
-            self.scene.observation = self.scene.observation.replace(**change)
+            # blurs that were edited stay when channel or filters change the rest of the PSF
+            self.scene.observation = with_blurs_of(before.replace(**change), before)
         except ValueError as error:
             show_error(str(error))
         self.show_observation()
@@ -295,6 +300,7 @@ class InstrumentForm(Form):
         self._apply_exposure()
         self._apply_position()
         self._apply_seed()
+        self.psf.apply_typed()
 
     def _draw_noise(self, event: Any = None) -> None:
         self.scene.new_noise()
@@ -337,12 +343,6 @@ def _frames(observation: Observation) -> list[tuple[str, tuple[int, int]]]:
     if shape not in sizes:
         sizes.append(shape)
     return [(f"{nx} × {ny} ({nx * scale:.1f}″)", (ny, nx)) for ny, nx in sizes]
-
-
-def _assumed_psf_text(observation: Observation) -> str:
-    if observation.instrument.name == "ISSIS":
-        return "PSF: assumed, about 0.10″ FWHM; none is published"
-    return f"PSF: assumed, of {observation.instrument.name}"
 
 
 def _filters(observation: Observation) -> list[tuple[str, Any]]:

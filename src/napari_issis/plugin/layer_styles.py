@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from ..sources import IMAGE
+
 ELLIPSE_COLORS = {
     "uniform": "cyan",
     "gaussian": "lightgreen",
     "exponential": "yellow",
     "devaucouleurs": "orange",
     "sersic": "magenta",
+    IMAGE: "dodgerblue",
 }
 # Beside the scale, which is the camera's.
 GEOMETRY: dict[str, Any] = {
@@ -59,6 +62,11 @@ def edge_width(shape: tuple[int, int]) -> float:
 def marker_size(shape: tuple[int, int]) -> float:
     """Return the size of the markers in pixels of a frame of this shape."""
     return min(MARKER_WIDTH * max(shape) / CANVAS, WIDEST_MARKER)
+
+
+def shape_types(kinds: Iterable[str]) -> list[str]:
+    """Return how each kind is drawn: images as the rectangles that they are."""
+    return ["rectangle" if kind == IMAGE else "ellipse" for kind in kinds]
 
 
 def edge_colors(kinds: Iterable[str]) -> list[str]:

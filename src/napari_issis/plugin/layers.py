@@ -15,12 +15,14 @@ from astropy import units as u
 from astropy.table import QTable
 from numpy.typing import NDArray
 
-from ..sources import check_sources, spectrum_texts
-from .table import put
+from ..source_image import kept_image
+from ..sources import IMAGE, SourceArrays, check_sources
+from .table import TEXTS, put
 
 Array = NDArray[np.float64]
 
-FEATURES = ("kind", "x", "y", "flux", "r_half", "ellipticity", "pa", "n", "spectrum")
+NUMBERS = ("x", "y", "flux", "r_half", "ellipticity", "pa", "n")
+FEATURES = ("kind", *NUMBERS, *TEXTS)
 # Semi-axes below half a pixel are drawn by a slip of the mouse, not on purpose.
 MIN_SEMI_AXIS = 0.5
 
@@ -34,12 +36,13 @@ def shapes_data(table: QTable) -> Array:
     """Half-light isophotes of extended sources as corners of ellipses, shape (n, 4, 2).
 
     The semi-major axis is ``r_half``, the semi-minor one ``r_half (1 - ellipticity)``; the
-    position angle is counted from +y counter-clockwise towards -x.
+    position angle is counted from +y counter-clockwise towards -x. Of images it is the outline.
     """
     s = check_sources(table)
     pa = np.radians(s.pa)
-    major = s.r_half[:, None] * np.column_stack([np.cos(pa), -np.sin(pa)])
-    minor = (s.r_half * (1 - s.ellipticity))[:, None] * np.column_stack([np.sin(pa), np.cos(pa)])
+    along, across = _semi_axes(s)
+    major = along[:, None] * np.column_stack([np.cos(pa), -np.sin(pa)])
+    minor = across[:, None] * np.column_stack([np.sin(pa), np.cos(pa)])
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
     centre = np.column_stack([s.y, s.x])
     corners: Array = (
@@ -48,6 +51,15 @@ def shapes_data(table: QTable) -> Array:
         + signs[None, :, 1:] * minor[:, None, :]
     )
     return corners
+
+
+def _semi_axes(s: SourceArrays) -> tuple[Array, Array]:
+    """Half-sizes along the direction of the position angle and across it."""
+    along, across = s.r_half.copy(), s.r_half * (1 - s.ellipticity)
+    for row in np.flatnonzero(s.kind == IMAGE):
+        half_y, half_x = kept_image(str(s.image[row])).half_sizes
+        along[row], across[row] = s.r_half[row] * half_y, s.r_half[row] * half_x
+    return along, across
 
 
 def ellipses(corners: Array) -> tuple[Array, Array, Array]:
@@ -100,7 +112,8 @@ def adopt_shapes(table: QTable, written: Array, corners: Array) -> QTable:
 
     Only what differs from ``written`` by more than napari's float32 rounding is taken over;
     a moved ellipse keeps its radius, ellipticity and angle bit for bit. Semi-axes are at
-    least half a pixel.
+    least half a pixel. An image keeps its proportions: it is scaled by area, and its position
+    angle is the direction of the outline's first edge.
 
     Parameters
     ----------
@@ -129,6 +142,10 @@ def adopt_shapes(table: QTable, written: Array, corners: Array) -> QTable:
     _, (old_a, old_b), old_pa = _axes(old)
     _, (a, b), pa = _axes(new)
     a, b = np.maximum(a, MIN_SEMI_AXIS), np.maximum(b, MIN_SEMI_AXIS)
+    images = bent & (np.asarray(table["kind"]) == IMAGE)
+    if images.any():
+        table = _adopt_outlines(table, _half_edges(old), _half_edges(new), rounding, images)
+        bent = bent & ~images
     longer = bent & (np.abs(a - old_a) > rounding)
     rounder = bent & (longer | (np.abs(b - old_b) > rounding))
     angle = np.radians((pa - old_pa + 90) % 180 - 90)
@@ -139,22 +156,42 @@ def adopt_shapes(table: QTable, written: Array, corners: Array) -> QTable:
     return table
 
 
+def _adopt_outlines(
+    table: QTable, old: Array, new: Array, rounding: Array, rows: NDArray[np.bool_]
+) -> QTable:
+    """Return the table with the size and angle of images whose outline was changed."""
+    s = check_sources(table)
+    along, across = _semi_axes(s)
+    r_half, pa = s.r_half.copy(), s.pa.copy()
+    for row in np.flatnonzero(rows):
+        before, area = (float(np.sqrt(abs(np.linalg.det(e[row])))) for e in (old, new))
+        if abs(area - before) > rounding[row]:
+            size = max(area, MIN_SEMI_AXIS)
+            r_half[row] *= size / np.sqrt(along[row] * across[row])
+        angle, was = (np.degrees(np.arctan2(-e[row, 1, 0], e[row, 0, 0])) for e in (new, old))
+        turn = (angle - was + 180) % 360 - 180
+        if abs(np.radians(turn)) * max(along[row], across[row]) > rounding[row]:
+            pa[row] = angle % 360
+    table["r_half"], table["pa"] = r_half * u.pix, pa * u.deg
+    return table
+
+
 def features(table: QTable, source_id: NDArray[np.int64]) -> pd.DataFrame:
     """Rows of the source table as layer features, with a stable ``source_id``.
 
     Values are those of the table's columns, in its units; ``n`` is NaN where there is none, the
-    spectrum ``flat``.
+    spectrum ``flat`` and the image an empty text.
     """
     columns: dict[str, Any] = {"kind": np.asarray(table["kind"], dtype=str).astype(object)}
-    for name in FEATURES[1:-1]:
+    for name in NUMBERS:
         if name in table.colnames:
             column = table[name]
             columns[name] = np.array(getattr(column, "value", column), dtype=np.float64)
         else:
             columns[name] = np.full(len(table), np.nan)
-    texts = spectrum_texts(table)
-    spectra = np.full(len(table), "flat") if texts is None else texts
-    columns["spectrum"] = spectra.astype(object)
+    for name, text in TEXTS.items():
+        texts = table[name] if name in table.colnames else np.full(len(table), text)
+        columns[name] = np.asarray(texts).astype(object)
     columns["source_id"] = np.asarray(source_id, dtype=np.int64)
     return pd.DataFrame(columns)
 
@@ -177,7 +214,7 @@ def adopt_features(table: QTable, written: pd.DataFrame, current: pd.DataFrame) 
             if changed.any():
                 table["kind"] = np.where(changed, new.astype(str), table["kind"]).astype("U13")
             continue
-        if name == "spectrum":
+        if name in TEXTS:
             changed = old.astype(str) != new.astype(str)
             if changed.any():
                 put(table, name, changed, new[changed])

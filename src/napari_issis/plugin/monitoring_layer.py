@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import napari
+from numpy.typing import NDArray
 
+from ..monitoring_tasks import IMAGES, import_dask
 from .contrast import contrast_limits
+from .frames import Frames
+from .layer_styles import GEOMETRY
 
 if TYPE_CHECKING:
     from ..monitoring import Monitoring
@@ -31,20 +36,44 @@ def show_monitoring(
     Returns
     -------
     napari.layers.Image
-        The layer. A frame is computed when the slider comes to it.
+        The layer. A frame is computed in the background when the slider comes to it, and dark
+        until it is there; the first one sets the contrast limits.
     """
+    if image not in IMAGES:
+        raise ValueError(f"image is {image!r}; known: {', '.join(IMAGES)}.")
+    import_dask()
     viewer = napari.Viewer() if viewer is None else viewer
-    stack = monitoring.stack(image, coadd=coadd)
-    first = stack[0].compute()
+    number = len(monitoring.epochs if coadd else monitoring.exposures)
     one = monitoring.exposures[0].observation
-    per_frame = len(monitoring.exposures) // len(stack)
+    sky = one.background_rate * one.exposure * (len(monitoring.exposures) // number)
+    untouched = (0.0, 1.0)
+
+    def arrived(frame: NDArray[Any]) -> None:
+        if layer not in viewer.layers:
+            frames.stop()
+            return
+        if tuple(layer.contrast_limits) == untouched:
+            layer.contrast_limits_range = (0.0, max(float(frame.max()), 1.0))
+            layer.contrast_limits = contrast_limits(frame, sky)
+        layer.refresh(extent=False)
+
+    frames = Frames(
+        (number, *monitoring.observation.shape),
+        "int64" if image == "counts" else "float64",
+        partial(monitoring.stack, image, coadd=coadd),
+        arrived,
+    )
     scale = monitoring.observation.pixel_scale
     layer = viewer.add_image(
-        stack,
+        frames,
         name=f"ISSIS monitoring, {image}",
         scale=(1.0, scale, scale),
-        contrast_limits=contrast_limits(first, one.background_rate * one.exposure * per_frame),
+        # the other layers' on the sky; napari's scale bar wants one unit for all
+        units=("pixel", *GEOMETRY["units"]),
+        contrast_limits=untouched,
         colormap="gray",
+        multiscale=False,
+        rgb=False,
     )
     if viewer.dims.ndim == 3:
         viewer.dims.axis_labels = ("epoch" if coadd else "exposure", "y", "x")

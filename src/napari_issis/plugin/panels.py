@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from qtpy.QtWidgets import QDockWidget, QWidget
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import QDockWidget, QMainWindow, QWidget
 
-LIST_NAME = "ISSIS sources"
+from .canvas_geometry import find_window
+
+LIST_NAME, ROW_NAME = "ISSIS sources", "ISSIS row trace"
+BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
+# Heights in pixels on the screen: so much that at 768 of them the canvas keeps the half.
+ROW_HEIGHT, LIST_HEIGHT = 120, 150
 
 
 def toggle_panel(viewer: Any, name: str, make: Callable[[Any], QWidget], area: str) -> None:
@@ -30,7 +36,30 @@ def toggle_panel(viewer: Any, name: str, make: Callable[[Any], QWidget], area: s
             dock = _dock_of(widget)
             dock.setVisible(not dock.isVisible())
             return
-    viewer.window.add_dock_widget(make(viewer), name=name, area=area)
+    widget = make(viewer)
+    viewer.window.add_dock_widget(widget, name=name, area=area)
+    window = find_window(widget)
+    if window is not None:
+        stack_at_bottom(window)
+
+
+def stack_at_bottom(window: QMainWindow) -> None:
+    """Put the list of sources below the row trace, where Qt has them side by side.
+
+    The trace has the axis of the canvas, and needs its width.
+    """
+    found: dict[str, QDockWidget] = {}
+    for dock in window.findChildren(QDockWidget):
+        for name in (ROW_NAME, LIST_NAME):
+            here = window.dockWidgetArea(dock) == BOTTOM and not dock.isFloating()
+            if here and not dock.isHidden() and dock.windowTitle().startswith(name):
+                found[name] = dock
+    heights = {ROW_NAME: ROW_HEIGHT, LIST_NAME: LIST_HEIGHT}
+    if len(found) == 2 and not window.tabifiedDockWidgets(found[ROW_NAME]):
+        window.splitDockWidget(found[ROW_NAME], found[LIST_NAME], Qt.Orientation.Vertical)
+    window.resizeDocks(
+        list(found.values()), [heights[name] for name in found], Qt.Orientation.Vertical
+    )
 
 
 def _dock_of(widget: QWidget) -> QWidget:

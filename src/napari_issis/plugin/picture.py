@@ -14,12 +14,13 @@ from ..drag import Drag
 from ..exposure import (
     Exposure,
     accuracy_for_counts,
+    dead_share,
     expected_of_rate,
     expose,
     noise_ready_rate,
     same_table,
 )
-from ..limits import count_rate_warnings
+from ..limits import brief_warning, count_rate_warnings
 from ..observation import Observation
 
 Array = NDArray[np.float64]
@@ -34,10 +35,14 @@ PREVIEW_SHARE = 0.05
 
 @dataclass(frozen=True)
 class Picture:
-    """An exposure to show; ``final`` unless it is a preview during a drag."""
+    """An exposure to show; ``final`` unless it is a preview during a drag.
+
+    ``warning`` says briefly which count-rate limit is broken, ``warnings`` at length.
+    """
 
     exposure: Exposure
     warnings: tuple[str, ...] = ()
+    warning: str = ""
     final: bool = True
 
 
@@ -65,13 +70,11 @@ class PictureMaker:
     def final(self, sources: QTable, observation: Observation, seed: int) -> Picture:
         """Make the exposure that `napari_issis.simulate` makes of the same scene."""
         rate, clipped = self._rate(sources, observation)
+        sky = observation.background_rate
         return Picture(
             expose(rate, sources, observation, seed=seed, clipped=clipped),
-            tuple(
-                count_rate_warnings(
-                    rate, observation.background_rate, sources=sources, observation=observation
-                )
-            ),
+            tuple(count_rate_warnings(rate, sky, sources=sources, observation=observation)),
+            brief_warning(rate, sky, sources, observation),
         )
 
     def preview(
@@ -91,15 +94,18 @@ class PictureMaker:
         moving = np.isin(source_id, held.source_id, invert=True)
         moving |= np.isin(source_id, list(held.moving))
         windows = live.move(sources[moving])
+        dead = dead_share(observation)
         if held.drawn is not None and held.drawn[0] == (observation, seed):
             _, before, counts = held.drawn
             expected = before.copy()
             for window in windows:
                 expected[window] = _expected(live.rate[window], observation)
-            counts = poisson_counts(expected, seed, previous=(before, counts), windows=windows)
+            counts = poisson_counts(
+                expected, seed, dead_share=dead, previous=(before, counts), windows=windows
+            )
         else:
             expected = _expected(live.rate, observation)
-            counts = poisson_counts(expected, seed)
+            counts = poisson_counts(expected, seed, dead_share=dead)
         # those taken over are stored already, which changes nothing a second time
         counts = observation.detector.stored(counts)
         held.drawn = ((observation, seed), expected, counts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..fits_header import wcs_header
 from ..observation import Observation
 from ..source_counts import expected_counts, signal_to_noise
 from ..source_rates import flux_pivot
-from ..sources import check_sources, spectrum_texts
+from ..sources import IMAGE, check_sources, spectrum_texts
 from .units import Units
 
 
@@ -87,9 +88,13 @@ def source_text(row: Row, observation: Observation, units: Units) -> str:
     if kind != "point":
         radius = units.length_text(float(one.r_half[0]), observation.pixel_scale)
         lines.append(f"R½ {radius} {units.length_label}")
-        lines.append(f"ε {one.ellipticity[0]:.3g}   PA {one.pa[0] % 180:.1f}°")
+        # an image has a top
+        turn = 360 if kind == IMAGE else 180
+        lines.append(f"ε {one.ellipticity[0]:.3g}   PA {one.pa[0] % turn:.1f}°")
     if kind == "sersic":
         lines.append(f"n {one.index[0]:.3g}")
+    if kind == IMAGE:
+        lines.append(os.path.basename(str(one.image[0])))
     if spectrum not in ("", "flat"):
         lines.append(spectrum)
     counts, ratio = expected_counts(table, observation), signal_to_noise(table, observation)

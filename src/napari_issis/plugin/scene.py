@@ -64,7 +64,8 @@ class Scene:
         ``picture`` after each exposure that came to the screen at rest, ``shown`` after each
         one, previews included, ``observation`` after a change of the instrument set-up or the seed,
         ``sources`` after a change of the source table, also during a drag, ``selection`` when
-        other sources are selected, ``progress`` after a change of `slow` or `cancelled`.
+        other sources are selected, ``progress`` after a change of `slow` or `cancelled`,
+        ``missing`` when a layer of the scene was deleted or is back.
     units : Units
         What fluxes and lengths are shown in.
     """
@@ -79,6 +80,7 @@ class Scene:
             sources=Event,
             selection=Event,
             progress=Event,
+            missing=Event,
         )
         self.editor = SourceEditor(self._soon, self._selected)
         self.counts = CountsLayer()
@@ -95,6 +97,7 @@ class Scene:
         self._error: BaseException | None = None
         self._set_up = 0
         self._told_version = 0
+        self._told_missing: tuple[str, ...] = ()
         self._requested: tuple[Any, bool] = (None, False)
         self._shown: tuple[Any, bool] = (None, False)
         self._timer = QTimer()
@@ -140,7 +143,8 @@ class Scene:
     @sources.setter
     def sources(self, table: Table) -> None:
         self.editor.replace(self._checked(table))
-        self._sources_set()
+        self.counts.rescale()
+        self._show_sources(all_layers=True)
         points = self.editor.points.holds(self.editor.sources["kind"])
         view = self.editor.points if 2 * points.sum() > points.size else self.editor.ellipses
         self.viewer.layers.selection.active = view.layer
@@ -171,7 +175,7 @@ class Scene:
         rescaled = observation.pixel_scale != self._observation.pixel_scale
         reframed = rescaled or observation.shape != self._observation.shape
         self._observation = observation
-        self.editor.observation = observation
+        self.editor.observe(observation)
         if reframed:
             self._fit_marks()
             # a view that stays as it is shows the new frame at another zoom than the whole
@@ -258,7 +262,8 @@ class Scene:
         """
         self.editor.take_over()
         self.editor.append(self._checked(table))
-        self._sources_set()
+        self.counts.rescale()
+        self._show_sources()
 
     def change(self, table: Table) -> None:
         """Put an edited copy of `sources`, with the same rows, in its place.
@@ -309,16 +314,21 @@ class Scene:
         self._soon()
 
     def undo(self, event: Any = None) -> None:
-        """Take back the last edit of the sources; nothing while the mouse holds one."""
+        """Take back the last edit of the sources or the PSF; nothing while the mouse holds one."""
         self.editor.take_over()
         if self.editor.undo():
-            self._show_sources()
+            self._restored()
 
     def redo(self, event: Any = None) -> None:
         """Do again the edit that was taken back last."""
         self.editor.take_over()
         if self.editor.redo():
-            self._show_sources()
+            self._restored()
+
+    def _restored(self) -> None:
+        self._show_sources()
+        # undo and redo change the PSF too
+        self.observation = self.editor.observation
 
     def wait(self, timeout: float = 60.0) -> None:
         """Wait until the picture is settled; keeps the window alive meanwhile.
@@ -357,6 +367,32 @@ class Scene:
         image = [] if self.counts.layer is None else [self.counts.layer]
         return image + self.editor.layers
 
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Roles of the layers that the user deleted: ``counts``, ``ellipses``, ``points``.
+
+        A layer of sources comes back with the first source for it, the image by `restore`.
+        """
+        image = () if self.counts.layer is not None else ("counts",)
+        return image + tuple(view.role for view in self.editor.views if view.layer is None)
+
+    def restore(self) -> None:
+        """Make the layers that the user deleted anew, with the sources that went with them.
+
+        Raises
+        ------
+        ValueError
+            If such a source has no light in the present channel; the scene stays as it was.
+        """
+        self.editor.take_over()
+        state = self.editor.with_lost()
+        rates_per_flux(state.sources, self._observation)
+        self._ensure_layers(all_layers=True)
+        if len(state.source_id) > len(self.editor.source_id):
+            self.editor.restore(state)
+            self.editor.write()
+        self._soon()
+
     def show_layers(self) -> None:
         """Make the layers anew if the user deleted all three."""
         if not self.layers:
@@ -377,23 +413,24 @@ class Scene:
         self.observation, self.seed = exposure.observation, exposure.seed
         self.sources = exposure.sources
 
-    def _sources_set(self) -> None:
-        self.counts.rescale()
-        self._show_sources()
-
-    def _show_sources(self) -> None:
-        self._ensure_layers()
+    def _show_sources(self, *, all_layers: bool = False) -> None:
+        self._ensure_layers(all_layers=all_layers)
         self.editor.write()
         self._soon()
 
-    def _ensure_layers(self) -> None:
-        """Make the layers that are missing: the image lowest, the points uppermost."""
+    def _ensure_layers(self, *, all_layers: bool = False) -> None:
+        """Make layers that are missing: the image lowest, the points uppermost.
+
+        Those that the user deleted only where sources need them, unless ``all_layers`` is set
+        or there is none at all.
+        """
         layers = self.viewer.layers
         new = not self.layers
+        all_layers = all_layers or new
         selected, active = set(layers.selection), layers.selection.active
         if new:
             self._orient()
-        if self.counts.layer is None:
+        if self.counts.layer is None and all_layers:
             observation = self._observation
             image = self.counts.make(observation.shape, observation.pixel_scale, self._picture)
             place = min((layers.index(above) for above in self.editor.layers), default=len(layers))
@@ -401,7 +438,8 @@ class Scene:
             self._bind_keys(image)
         with self.editor.quiet():
             for view in self.editor.views:
-                if view.layer is None:
+                needed = all_layers or view.holds(self.editor.sources["kind"]).any()
+                if view.layer is None and needed:
                     view.forget()
                     view.layer = view.make()
                     points = self.editor.points.layer
@@ -481,6 +519,7 @@ class Scene:
     def _layer_removed(self, event: Any) -> None:
         if event.value is self.counts.layer:
             self.counts.layer = None
+            self._soon()
         self.editor.layer_removed(event.value)
         if not self.layers and self.viewer.scene.camera.orientation2d == ORIENTATION:
             self.viewer.scene.camera.orientation2d = self._orientation
@@ -502,6 +541,9 @@ class Scene:
         if self._told_version != self.editor.version:
             self._told_version = self.editor.version
             self.events.sources()
+        if self._told_missing != self.missing:
+            self._told_missing = self.missing
+            self.events.missing()
         held = self.editor.held
         if not self.layers:
             self._jobs.drop()
@@ -569,11 +611,13 @@ class Scene:
             return
         self._shown, picture = result
         previous, self._picture = self._picture, picture
-        if self.counts.layer is None:
-            self._ensure_layers()
         self.counts.show(picture)
         shape = picture.exposure.counts.shape
-        if self._alone and (previous is None or previous.exposure.counts.shape != shape):
+        if (
+            self.counts.layer is not None
+            and self._alone
+            and (previous is None or previous.exposure.counts.shape != shape)
+        ):
             self.viewer.reset_view(layers=[self.counts.layer])
         self.events.shown()
         if picture.final:

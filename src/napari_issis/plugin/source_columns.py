@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,17 +22,19 @@ from ..sources import (
     DEFAULT_PA,
     DEFAULT_R_HALF,
     FLUX_UNIT,
+    IMAGE,
     KINDS,
     check_sources,
     spectrum_texts,
 )
 from .number_field import number_text, read_number
+from .table import TEXTS as MISSING
 from .table import master_table, put
 from .units import FLUX_LABELS, LENGTH_LABELS, Units
 
 Array = NDArray[np.float64]
 DEFAULT_INDEX = 2.0
-TEXTS = ("kind", "spectrum")
+TEXTS = ("kind", "spectrum", "image")
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Column:
         Heading, less the unit.
     form : str
         Format of its numbers.
-    kinds : {"all", "extended", "sersic"}
+    kinds : {"all", "extended", "sersic", "image"}
         Sources that have it.
     tooltip : str
         What it is.
@@ -64,6 +66,8 @@ class Column:
 
     def applies(self, kind: str) -> bool:
         """Whether sources of a kind have this value."""
+        if self.kinds == IMAGE:
+            return kind == IMAGE
         return (
             self.kinds == "all"
             or kind == "sersic"
@@ -90,6 +94,7 @@ COLUMNS = (
         "flat, powerlaw(-1.5), blackbody(30000 K), line(1550 A, 10 A) or table(star.ecsv); with "
         "z=, ebv= and at= (angstrom), where F is given",
     ),
+    Column("image", "image", "", IMAGE, "Image that the source is: file and digest", False),
 )
 
 
@@ -125,6 +130,7 @@ def shown_values(table: QTable, observation: Observation, units: Units) -> dict[
         "counts": expected_counts(table, observation),
         "snr": signal_to_noise(table, observation),
         "spectrum": np.full(len(table), "flat") if texts is None else texts,
+        "image": arrays.image,
     }
 
 
@@ -214,11 +220,13 @@ _UNITS |= {label.lower(): ("length", name) for name, label in LENGTH_LABELS.item
 _UNITS |= {"arcsec": ("length", "arcsec"), "pix": ("length", "px")}
 
 
-def to_text(values: Mapping[str, Any], rows: Any, units: Units) -> str:
+def to_text(
+    values: Mapping[str, Any], rows: Any, units: Units, columns: Sequence[Column] = COLUMNS
+) -> str:
     """Rows of the list as tab-separated text under their headings."""
-    lines = ["\t".join(heading(column, units) for column in COLUMNS)]
+    lines = ["\t".join(heading(column, units) for column in columns)]
     lines += [
-        "\t".join(exact_text(column, values[column.name][row]) for column in COLUMNS)
+        "\t".join(exact_text(column, values[column.name][row]) for column in columns)
         for row in rows
     ]
     return "\n".join(lines) + "\n"
@@ -274,7 +282,7 @@ def from_text(pasted: str, observation: Observation, units: Units) -> QTable:
     if not rows:
         raise ValueError("the text holds no source; it has headings only.")
     named = {name: None for row in rows for name in row}
-    columns = {name: np.array([row.get(name, "flat") for row in rows]) for name in named}
+    columns = {name: np.array([row.get(name, MISSING.get(name)) for row in rows]) for name in named}
     columns["flux"] = columns["flux"] * FLUX_UNIT
     columns["r_half"] = columns["r_half"] * u.pix
     columns["pa"] = columns["pa"] * u.deg
@@ -300,7 +308,7 @@ def _row(row: dict[str, str], observation: Observation, units: Units) -> dict[st
     def number(name: str, default: float) -> float:
         return read_number(name, row[name]) if name in row else default
 
-    texts = {"spectrum": row["spectrum"]} if "spectrum" in row else {}
+    texts = {name: row[name] for name in MISSING if name in row}
     try:
         pivot = flux_pivot(row.get("spectrum", ""), observation)
     except ValueError as error:

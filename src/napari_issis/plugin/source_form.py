@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from astropy.table import QTable
@@ -12,6 +13,8 @@ from qtpy.QtWidgets import QWidget
 
 from ..lensed_quasars import lensed_quasar
 from ..populations import CLUSTER_FLUX, random_sources, star_cluster
+from ..source_image import image_source
+from ..source_rates import cps_per_flux, flux_pivot
 from ..sources import (
     DEFAULT_ELLIPTICITY,
     DEFAULT_FLUX,
@@ -24,11 +27,14 @@ from .cluster_rows import ClusterRows
 from .count_field import CountField
 from .flux_rows import FluxRows
 from .form import Field, Form
+from .image_rows import ImageRows
 from .lens_rows import LensRows
 from .limit_fields import Limits, QuantityLimits
 from .number_field import NumberField, SeedField
 from .quantity_field import QuantityField
 from .scene import Scene
+from .spectrum_field import SpectrumField
+from .table import put
 from .units import FluxScale, LengthScale
 
 KIND_TEXT = {
@@ -42,6 +48,7 @@ MODES = (
     ("random distribution", "random"),
     ("star cluster", "cluster"),
     ("lensed quasar", "lens"),
+    ("image from a file", "image"),
 )
 FLUX_HELP = "Flux F, averaged over the channel, or AB magnitude"
 R_HELP = "Semi-major axis of the ellipse that holds half of the light (a pixel is 0.036″)"
@@ -79,6 +86,8 @@ class SourceForm(Form):
             widget.changed.connect(self._show_fields)
         for field in (self.flux, self.r_half, self.ellipticity, self.pa, self.n):
             field.changed.connect(self._describe_drawn)
+        # also which magnitude a flux is
+        self.spectrum.native.editTextChanged.connect(self.show_units)
         self.flux_unit.changed.connect(lambda unit: setattr(self.scene.units, "flux", unit))
         self.length_unit.changed.connect(lambda unit: setattr(self.scene.units, "length", unit))
         self.button.changed.connect(self.add_sources)
@@ -98,7 +107,7 @@ class SourceForm(Form):
             choices=list(MODES),
             value="specific",
             tooltip="One source with these parameters, a random population over the frame, "
-            "the stars of a cluster, or a known lensed quasar",
+            "the stars of a cluster, a known lensed quasar, or an image as a source",
         )
         self.kind = ComboBox(
             choices=[(KIND_TEXT.get(kind, kind), kind) for kind in KINDS],
@@ -120,6 +129,9 @@ class SourceForm(Form):
         )
         self.pa = NumberField("pa", DEFAULT_PA, PA_HELP, _is("pa"))
         self.n = NumberField("n", 2.0, N_HELP, _is("n"))
+        self.spectrum = SpectrumField(
+            check=lambda spectrum: cps_per_flux(spectrum, self.scene.observation)
+        )
 
     def _make_population(self) -> None:
         self.number = CountField(
@@ -148,20 +160,22 @@ class SourceForm(Form):
         self.add("&Mode", self.mode)
         self._add_row("&Kind", self.kind, modes="specific random")
         self._add_row("Num&ber", self.number, modes="random cluster")
-        self._add_row("x, y (px)", self.x, self.y, modes="specific cluster lens")
-        self._flux_row = self._add_row("F", self.flux, modes="specific")
+        self._add_row("x, y (px)", self.x, self.y, modes="specific cluster lens image")
+        self._flux_row = self._add_row("F", self.flux, modes="specific image")
         self._r_row = self._add_row("R½", self.r_half, modes="specific", kinds=EXTENDED)
         self._add_row("Ellipticity", self.ellipticity, modes="specific", kinds=EXTENDED)
-        self._add_row("PA (°)", self.pa, modes="specific", kinds=EXTENDED)
+        self._add_row("PA (°)", self.pa, modes="specific image", kinds=EXTENDED)
         self._add_row("Sérsic n", self.n, modes="specific", kinds=SERSIC)
         self.cluster = ClusterRows(self)
         self.lens = LensRows(self)
+        self.image = ImageRows(self)
         self.fluxes = FluxRows(self, "uniform", (1e-15, 1e-14), _is("flux"))
         self.cluster_fluxes = FluxRows(self, "power", CLUSTER_FLUX, _is("flux"))
         self._r_limits_row = self._add_limits("R½", self.r_limits, EXTENDED)
         self._add_limits("Ellipticity", self.e_limits, EXTENDED)
         self._add_limits("PA (°)", self.pa_limits, EXTENDED)
         self._add_limits("Sérsic n", self.n_limits, SERSIC)
+        self._add_row("Spectrum", self.spectrum, modes="specific random cluster")
         self._add_row("See&d", self.seed, modes="random cluster")
 
     def _add_row(
@@ -201,16 +215,18 @@ class SourceForm(Form):
     def show_units(self, event: Any = None) -> None:
         """Convert all fluxes and lengths to the scene's units."""
         units, observation = self.scene.units, self.scene.observation
+        self.spectrum.mark()
         for box, unit in ((self.flux_unit, units.flux), (self.length_unit, units.length)):
             with box.changed.blocked():
                 box.value = unit
-        flux_scale = units.flux_scale(observation.pivot)
+        flux_scale = units.flux_scale(self._pivot())
+        lens_scale = units.flux_scale(observation.pivot)
         length_scale = units.length_scale(observation.pixel_scale)
         self.flux.show_in(flux_scale)
         self.relabel(self._flux_row, f"F ({units.flux_label})")
         for rows in (self.fluxes, self.cluster_fluxes):
             rows.show_in(flux_scale, units.flux_label)
-        self.lens.show_in(flux_scale, units.flux_label)
+        self.lens.show_in(lens_scale, units.flux_label)
         for row, name, field in (
             (self._r_row, "R½", self.r_half),
             (self._r_limits_row, "R½", self.r_limits),
@@ -226,23 +242,33 @@ class SourceForm(Form):
         Raises
         ------
         ValueError
-            If a value is no number or out of range.
+            If a value is no number or out of range, or the spectrum is none.
         """
         if self.mode.value == "specific":
             return source(x=self.x.number, y=self.y.number, **self._one())
         if self.mode.value == "cluster":
-            return star_cluster(
-                self.number.number,
-                centre=(self.x.number, self.y.number),
-                seed=self.seed.number,
-                **self.cluster.options(),
-                **self.cluster_fluxes.options(),
+            return self._with_spectrum(
+                star_cluster(
+                    self.number.number,
+                    centre=(self.x.number, self.y.number),
+                    seed=self.seed.number,
+                    **self.cluster.options(),
+                    **self.cluster_fluxes.options(),
+                )
             )
         if self.mode.value == "lens":
             return lensed_quasar(
                 observation=self.scene.observation,
                 centre=(self.x.number, self.y.number),
                 **self.lens.options(),
+            )
+        if self.mode.value == "image":
+            return image_source(
+                x=self.x.number,
+                y=self.y.number,
+                flux=self.flux.number,
+                pa=self.pa.number,
+                **self.image.options(),
             )
         kind = self.kind.value
         ranges: dict[str, Any] = {}
@@ -254,20 +280,36 @@ class SourceForm(Form):
             )
         if kind == "sersic":
             ranges["index"] = self.n_limits.numbers
-        return random_sources(
-            kind,
-            self.number.number,
-            shape=self.scene.observation.shape,
-            seed=self.seed.number,
-            **self.fluxes.options(),
-            **ranges,
+        return self._with_spectrum(
+            random_sources(
+                kind,
+                self.number.number,
+                shape=self.scene.observation.shape,
+                seed=self.seed.number,
+                **self.fluxes.options(),
+                **ranges,
+            )
         )
+
+    def _with_spectrum(self, table: QTable) -> QTable:
+        for name, text in self.spectrum.options.items():
+            put(table, name, slice(None), text)
+        return table
+
+    def _pivot(self) -> float:
+        """Wavelength at which a magnitude of the form is a flux, angstrom."""
+        observation = self.scene.observation
+        try:
+            return flux_pivot(self.spectrum.text, observation)
+        except ValueError:
+            # half typed
+            return observation.pivot
 
     def add_sources(self, event: Any = None) -> None:
         """Add the sources; an error is shown and changes nothing."""
         try:
             self.scene.add(self.table())
-        except ValueError as error:
+        except (OSError, ValueError) as error:
             show_error(str(error))
             return
         if self.mode.value in ("random", "cluster"):
@@ -275,7 +317,7 @@ class SourceForm(Form):
 
     def _one(self) -> dict[str, Any]:
         kind = self.kind.value
-        one: dict[str, Any] = {"kind": kind, "flux": self.flux.number}
+        one: dict[str, Any] = {"kind": kind, "flux": self.flux.number, **self.spectrum.options}
         if kind != "point":
             one.update(
                 r_half=self.r_half.number,
@@ -286,19 +328,22 @@ class SourceForm(Form):
         return one
 
     def _describe_drawn(self, event: Any = None) -> None:
-        try:
-            one = self._one()
-        except ValueError:
-            # Half typed: what was valid last stays.
-            return
-        self.scene.new_source = {**self.scene.new_source, "n": None, **one}
+        new = dict(self.scene.new_source)
+        # Half typed: what was valid last stays.
+        with suppress(ValueError):
+            new.update({"n": None, "spectrum": None, **self._one()})
+        if not self.spectrum.valid:
+            # but it may have no light in another channel
+            new["spectrum"] = None
+        self.scene.new_source = new
 
     def _show_fields(self, event: Any = None) -> None:
         mode, kind = self.mode.value, self.kind.value
         for row, modes, kinds in self._rows_where:
-            self.show_row(row, mode in modes and kind in kinds)
+            self.show_row(row, mode in modes and (kind in kinds or mode == "image"))
         self.cluster.show(mode == "cluster")
         self.lens.show(mode == "lens")
+        self.image.show(mode == "image")
         self.fluxes.show(mode == "random")
         self.cluster_fluxes.show(mode == "cluster")
         self._describe_drawn()

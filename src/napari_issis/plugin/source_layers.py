@@ -11,6 +11,7 @@ from astropy.table import QTable
 from napari.layers import Points, Shapes
 from numpy.typing import NDArray
 
+from ..sources import IMAGE
 from . import layer_styles as styles
 from .layers import (
     FEATURES,
@@ -37,6 +38,8 @@ class SourceLayer:
         None where the user deleted it or it was not needed yet.
     source_id : ndarray of int
         Ids of the rows that the layer held when the two were last in step.
+    lost : tuple of QTable and ndarray, or None
+        The sources that went with the layer when the user deleted it, and their ids.
     """
 
     role = ""
@@ -44,6 +47,7 @@ class SourceLayer:
 
     def __init__(self, layer: Any = None) -> None:
         self.layer = layer
+        self.lost: tuple[QTable, Ids] | None = None
         self.forget()
 
     def forget(self) -> None:
@@ -122,25 +126,34 @@ class SourceLayer:
             return
         mine = self.holds(table["kind"])
         part, ids = table[mine], source_id[mine]
-        selected = set(self.current_ids()[list(self.layer.selected_data)])
-        self.replace(self.geometry(part), part)
-        self.layer.features = features(part, ids)
+        written = features(part, ids)
         mark = {"role": self.role, "flux_unit": str(table["flux"].unit)}
         self.layer.metadata = {**self.layer.metadata, MARKER: mark}
-        self.layer.selected_data = {
-            int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
-        }
-        self.in_step(part, ids)
+        current = self.layer.features
+        if not (
+            len(current) == len(written)
+            and current.reindex(columns=written.columns).equals(written)
+            and self.shows(part)
+        ):
+            selected = set(self.current_ids()[list(self.layer.selected_data)])
+            self.replace(self.geometry(part), part)
+            self.layer.features = written.copy()
+            self.layer.selected_data = {
+                int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))
+            }
+        self._note(written, ids)
 
     def in_step(self, part: QTable, source_id: Ids) -> None:
         """Note what the layer holds now, and the features of these rows in the layer."""
-        self.source_id = source_id
-        self._features = features(part, source_id)
-        self._geometry = self.read().copy()
+        self._note(features(part, source_id), source_id)
         table = self.layer.features
         for name in self._features.columns:
             # Setting a column in place emits nothing.
             table[name] = self._features[name].to_numpy()
+
+    def _note(self, table: pd.DataFrame, source_id: Ids) -> None:
+        self.source_id, self._features = source_id, table
+        self._geometry = self.read().copy()
 
     def shows(self, table: QTable) -> bool:
         """Whether the layer shows these rows, which are its own, as the table has them."""
@@ -233,7 +246,8 @@ class PointsLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """Points only."""
-        return np.array([kind == "point" for kind in kinds], dtype=bool)
+        held: NDArray[np.bool_] = np.asarray(kinds, dtype=np.str_) == "point"
+        return held
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Positions."""
@@ -295,7 +309,8 @@ class EllipsesLayer(SourceLayer):
 
     def holds(self, kinds: Any) -> NDArray[np.bool_]:
         """All but points."""
-        return np.array([kind != "point" for kind in kinds], dtype=bool)
+        held: NDArray[np.bool_] = np.asarray(kinds, dtype=np.str_) != "point"
+        return held
 
     def geometry(self, table: QTable, *, empty: bool = False) -> Array:
         """Corners of the half-light isophotes."""
@@ -307,8 +322,12 @@ class EllipsesLayer(SourceLayer):
         return np.array(corners, dtype=np.float64) if len(corners) else np.empty((0, 4, 2))
 
     def foreign(self) -> list[int]:
-        """Other shapes than ellipses."""
-        return [row for row, kind in enumerate(self.layer.shape_type) if kind != "ellipse"]
+        """Other shapes than ellipses and the rectangles of images."""
+        other = [row for row, kind in enumerate(self.layer.shape_type) if kind != "ellipse"]
+        if not other or "kind" not in self.layer.features.columns:
+            return other
+        kinds = self.layer.features["kind"].to_numpy()
+        return [row for row in other if kinds[row] != IMAGE]
 
     def moved(self, table: QTable, written: Array, current: Array) -> QTable:
         """Return the table with the ellipses that changed."""
@@ -331,12 +350,16 @@ class EllipsesLayer(SourceLayer):
         )
 
     def replace(self, data: Array, table: QTable) -> None:
-        """Put ellipses into the layer."""
+        """Put ellipses and images into the layer."""
         self.layer.selected_data = set()
-        self.layer.data = [(corners, "ellipse") for corners in data]
+        self.layer.data = list(zip(data, styles.shape_types(table["kind"]), strict=True))
         if len(data):
             self.layer.edge_color = styles.edge_colors(table["kind"])
             self.layer.edge_width = [self._edge_width] * len(data)
+
+    def shows(self, table: QTable) -> bool:
+        """Tell whether the layer shows these rows, each in its shape."""
+        return super().shows(table) and self.layer.shape_type == styles.shape_types(table["kind"])
 
     def recolor(self, kinds: Iterable[str]) -> None:
         """Give each ellipse the colour of its kind."""

@@ -17,6 +17,7 @@ from qtpy.QtGui import QHideEvent, QKeySequence, QShortcut, QShowEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QApplication,
+    QCheckBox,
     QComboBox,
     QFileDialog,
     QHBoxLayout,
@@ -34,10 +35,12 @@ from superqt.utils import qthrottled
 
 from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
 from ..sources import KINDS
+from .list_forecast import ListForecast, with_forecast
+from .photometry_dialog import PhotometryDialog
 from .reader import tell_notes
 from .scene import open_scene
 from .source_columns import COLUMNS, from_text, to_text
-from .source_model import SourceModel
+from .source_model import ALL_COLUMNS, SourceModel
 
 # Milliseconds between two updates during a drag.
 REST = 100
@@ -59,7 +62,8 @@ class SourceList(QWidget):  # type: ignore[misc]
     def __init__(self, napari_viewer: Any) -> None:
         super().__init__()
         self.scene = open_scene(viewer=napari_viewer, dock=False)
-        self.model = SourceModel(self.scene)
+        self.forecast = ListForecast(self.scene)
+        self.model = SourceModel(self.scene, self.forecast)
         self.view = QTableView()
         self.view.setModel(self.model)
         self.view.setToolTip(
@@ -74,15 +78,25 @@ class SourceList(QWidget):  # type: ignore[misc]
         across, down = self.view.horizontalHeader(), self.view.verticalHeader()
         across.setSortIndicator(-1, Qt.SortOrder.AscendingOrder)
         across.setSortIndicatorClearable(True)
+        # of the list's own selection, the headings would ask Qt's flags of every cell
+        across.setSelectionModel(QItemSelectionModel(self.model, across))
         down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         down.setDefaultSectionSize(self.fontMetrics().height() + 6)
         down.setToolTip("Number of the source, from 0")
         character = self.fontMetrics().averageCharWidth()
-        for section, column in enumerate(COLUMNS):
+        for section, column in enumerate(ALL_COLUMNS):
+            self.view.setColumnHidden(section, section >= len(COLUMNS))
             self.view.setColumnWidth(section, (WIDTHS.get(column.name, 9)) * character + 14)
         self.count = QLabel()
+        self.forecast_box = QCheckBox("&Forecast")
+        self.forecast_box.setToolTip(
+            "Show what can be measured of each source in the crowd, all fitted together"
+        )
+        self.forecast_box.toggled.connect(self._forecast_toggled)
+        self.forecast.changed.connect(self.model.show_forecast)
         row = QHBoxLayout()
         row.addWidget(self.count)
+        row.addWidget(self.forecast_box)
         row.addStretch(1)
         for label, tooltip, action in (
             ("Undo", "Take back the last edit (Ctrl+Z)", self.scene.undo),
@@ -92,6 +106,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             ("Delete", "Remove the selected sources (Del)", self.delete),
             ("&Import…", "Add a catalogue: ECSV, CSV, FITS, VOTable, DS9", self.load),
             ("Expor&t…", "Write the sources to a file: ECSV, CSV, FITS, VOTable", self.save),
+            ("&Photometry…", "Measure sources in apertures, beside the truth", self.photometry),
         ):
             button = QPushButton(label)
             button.setToolTip(tooltip)
@@ -113,6 +128,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             shortcut.activated.connect(action)
         self.view.selectionModel().selectionChanged.connect(self._rows_selected)
         self.model.refused.connect(self._tell_refused)
+        self._photometry: PhotometryDialog | None = None
         self._following = self._selecting = False
         self._soon = qthrottled(self.refresh, timeout=REST)
 
@@ -123,6 +139,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         if not self._following:
             return
         self.model.refresh()
+        self.forecast.follow()
         self._show_selection()
 
     def _sources_changed(self, event: Any = None) -> None:
@@ -135,7 +152,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         rows = self.model.rows_of(self.scene.editor.selected_ids)
         self.count.setText(_count(len(self.model.source_id), rows.size))
         chosen = QItemSelection()
-        last = len(COLUMNS) - 1
+        last = len(ALL_COLUMNS) - 1
         for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
             if run.size:
                 first, end = self.model.index(int(run[0]), 0), self.model.index(int(run[-1]), last)
@@ -163,7 +180,8 @@ class SourceList(QWidget):  # type: ignore[misc]
 
     def selected_ids(self) -> list[int]:
         """Ids of the selected rows, from the top down."""
-        rows = sorted(index.row() for index in self.view.selectionModel().selectedRows())
+        ranges = self.view.selectionModel().selection()
+        rows = sorted({row for one in ranges for row in range(one.top(), one.bottom() + 1)})
         return self.model.ids_of(rows)
 
     def _tell_refused(self, index: QModelIndex, reason: str) -> None:
@@ -177,7 +195,9 @@ class SourceList(QWidget):  # type: ignore[misc]
         """Put the selected rows on the clipboard as tab-separated text with all digits."""
         rows = self.model.order[self.model.rows_of(self.selected_ids())]
         if rows.size:
-            QApplication.clipboard().setText(to_text(self.model.values, rows, self.scene.units))
+            columns = ALL_COLUMNS if self._has_forecast() else COLUMNS
+            text = to_text(self.model.values, rows, self.scene.units, columns)
+            QApplication.clipboard().setText(text)
 
     def paste(self) -> None:
         """Add the sources that the clipboard holds as text."""
@@ -218,12 +238,37 @@ class SourceList(QWidget):  # type: ignore[misc]
             return
         path = dialog.selectedFiles()[0]
         try:
+            forecast = self._has_forecast()
+            table = with_forecast(self.scene.sources, self.model.values if forecast else None)
             # The dialog has asked before it chose a file that exists.
-            write_sources(self.scene.sources, path, overwrite=True)
+            write_sources(table, path, overwrite=True)
         except (OSError, ValueError) as error:
             show_error(str(error))
         else:
-            show_info(f"Saved {path}")
+            without = self.forecast.on and not forecast
+            show_info(f"Saved {path}{', without the forecast still in the making' * without}")
+
+    def _forecast_toggled(self, on: bool) -> None:
+        self.forecast.on = on
+        for section in range(len(COLUMNS), len(ALL_COLUMNS)):
+            self.view.setColumnHidden(section, not on)
+        if on:
+            self.forecast.follow()
+        else:
+            self.forecast.pause()
+        self.model.show_forecast()
+
+    def _has_forecast(self) -> bool:
+        """Whether there is a forecast of the sources as they are now."""
+        self.refresh()
+        return self.forecast.on and not self.forecast.pending
+
+    def photometry(self) -> None:
+        """Open the dialog of aperture photometry."""
+        if self._photometry is None:
+            self._photometry = PhotometryDialog(self.scene, self)
+        self._photometry.show()
+        self._photometry.raise_()
 
     def _select_last(self, count: int) -> None:
         self.scene.editor.select(self.scene.editor.source_id[-count:].tolist())
@@ -253,6 +298,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             events.picture.disconnect(self._sources_changed)
             events.selection.disconnect(self._show_selection)
             self.scene.units.events.changed.disconnect(self._sources_changed)
+            self.forecast.pause()
         super().hideEvent(event)
 
 
@@ -262,7 +308,7 @@ class _Delegate(QStyledItemDelegate):  # type: ignore[misc]
     def createEditor(
         self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
     ) -> QWidget:
-        if COLUMNS[index.column()].name != "kind":
+        if ALL_COLUMNS[index.column()].name != "kind":
             return super().createEditor(parent, option, index)
         box = QComboBox(parent)
         box.addItems(KINDS)

@@ -10,8 +10,10 @@ from astropy.table import QTable, Table, vstack
 from numpy.typing import NDArray
 
 from ..instruments import PIXEL_SCALE
-from ..sources import FLUX_UNIT, check_sources, spectrum_texts
+from ..sources import FLUX_UNIT, IMAGE, check_sources, image_texts, spectrum_texts
 
+# Columns of text that a table may lack, and what a source then has.
+TEXTS = {"spectrum": "flat", IMAGE: ""}
 STRUCTURE_UNITS = {"r_half": u.pix, "ellipticity": None, "pa": u.deg}
 
 
@@ -41,7 +43,7 @@ def master_table(table: Table, pixel_scale: float = PIXEL_SCALE) -> QTable:
         raise ValueError(str(error)) from error
     master = QTable(table, copy=True)
     extended = arrays.kind != "point"
-    width = max([13, *(len(kind) for kind in arrays.kind)])
+    width = int(np.char.str_len(arrays.kind).max(initial=13))
     master["kind"] = arrays.kind.astype(f"U{width}")
     master["x"], master["y"] = arrays.x, arrays.y
     flux = table["flux"]
@@ -56,19 +58,21 @@ def master_table(table: Table, pixel_scale: float = PIXEL_SCALE) -> QTable:
     texts = spectrum_texts(table)
     if texts is not None:
         master["spectrum"] = np.array([text or "flat" for text in texts], dtype=np.str_)
+    texts = image_texts(table)
+    if texts is not None:
+        master["image"] = texts
     return master
 
 
 def put(table: QTable, name: str, rows: Any, values: Any) -> None:
     """Put values into rows of a column, which is made if the table lacks it.
 
-    Other sources then have no number there, and the flat spectrum. Text of any length fits.
+    Other sources then have no number there, the flat spectrum, no image. Text of any length
+    fits.
     """
-    if name == "spectrum":
-        texts = spectrum_texts(table)
-        column = (
-            np.full(len(table), "flat", dtype=object) if texts is None else texts.astype(object)
-        )
+    if name in TEXTS:
+        texts = table[name] if name in table.colnames else np.full(len(table), TEXTS[name])
+        column = np.asarray(texts).astype(object)
         column[rows] = values
         table[name] = np.array([str(text) for text in column], dtype=np.str_)
         return
@@ -106,8 +110,9 @@ def join(first: QTable, second: QTable, *, pivot: float | NDArray[np.float64]) -
     for one, other in ((first, second), (second, first)):
         if "n" in other.colnames and "n" not in one.colnames:
             one["n"] = np.full(len(one), np.nan)
-        if "spectrum" in other.colnames and "spectrum" not in one.colnames:
-            one["spectrum"] = np.full(len(one), "flat")
+        for name, text in TEXTS.items():
+            if name in other.colnames and name not in one.colnames:
+                one[name] = np.full(len(one), text)
     return vstack([first, second], metadata_conflicts="silent")
 
 

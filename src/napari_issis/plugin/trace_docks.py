@@ -21,6 +21,7 @@ from qtpy.QtWidgets import (
 )
 
 from .canvas_geometry import find_window
+from .panels import ROW_NAME, stack_at_bottom
 from .scene import open_scene
 from .trace_plot import TracePlot
 from .traces import Along, Trace, traces_of
@@ -28,7 +29,7 @@ from .traces import Along, Trace, traces_of
 FREEZE_KEY = "Shift-F"
 RIGHT, BOTTOM = Qt.DockWidgetArea.RightDockWidgetArea, Qt.DockWidgetArea.BottomDockWidgetArea
 # Pixels on the screen.
-ROW_HEIGHT, COLUMN_WIDTH = 150, 150
+COLUMN_WIDTH = 150
 
 
 class TraceWidget(QWidget):  # type: ignore[misc]
@@ -180,7 +181,7 @@ class RowTrace(TraceWidget):
         if window.dockWidgetArea(dock) == RIGHT:
             window.addDockWidget(BOTTOM, dock)
         if window.dockWidgetArea(dock) == BOTTOM:
-            window.resizeDocks([dock], [ROW_HEIGHT], Qt.Orientation.Vertical)
+            stack_at_bottom(window)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Leave the docks at the right their height."""
@@ -236,7 +237,7 @@ class ColumnTrace(TraceWidget):
         window.resizeDocks([dock, *others[:1]], [COLUMN_WIDTH, *widths], Qt.Orientation.Horizontal)
 
 
-ROW_DOCK, COLUMN_DOCK = "ISSIS row trace", "ISSIS column trace"
+ROW_DOCK, COLUMN_DOCK = ROW_NAME, "ISSIS column trace"
 _WIDGETS: dict[str, type[TraceWidget]] = {ROW_DOCK: RowTrace, COLUMN_DOCK: ColumnTrace}
 
 

@@ -14,6 +14,7 @@ from .scene import Scene
 from .side_by_side import SideBySide
 from .trace_docks import FREEZE_KEY, show_traces, traces_shown
 from .traces import traces_of
+from .whole_frame import WholeFrame
 from .zoom import FACTORS, FIT_KEY, KEYS, Zoom
 
 # Width of napari's check boxes without their text, pixels on the screen.
@@ -33,6 +34,7 @@ class ViewForm(Form):
         super().__init__("View")
         self.scene = scene
         self.zoom, self.frames = Zoom(scene), SideBySide(scene)
+        self.whole = WholeFrame(self.zoom)
         self.traces = traces_of(scene)
         self._compass: Compass | None = None
 
@@ -89,6 +91,7 @@ class ViewForm(Form):
         self._scale_bar.events.visible.connect(self.show_view)
         self.frames.events.enabled.connect(self.show_view)
         self.traces.events.watched.connect(self.show_view)
+        self.whole.resume()
         self.show_view()
 
     def pause(self) -> None:
@@ -96,6 +99,7 @@ class ViewForm(Form):
         self._scale_bar.events.visible.disconnect(self.show_view)
         self.frames.events.enabled.disconnect(self.show_view)
         self.traces.events.watched.disconnect(self.show_view)
+        self.whole.pause()
 
     def show_view(self, event: Any = None) -> None:
         """Show how the viewer is set."""

@@ -12,7 +12,15 @@ from ..source_rates import sources_and_rates
 from ..sources import SourceArrays
 from .bounds import brightest_pixels, outside, psf_beyond, unseen
 from .direct import add_direct, has_sharp_edge
-from .gaussians import NODES, decompose
+from .gaussians import NODES, Gaussians, decompose, join
+from .images import (
+    highest_gaussian,
+    image_excess,
+    image_gaussians,
+    image_peak,
+    image_reach,
+    is_image,
+)
 from .meshes import LARGEST_DISC, mesh_rate
 from .optics import Optics
 from .plan import BAND, make_plan
@@ -123,21 +131,35 @@ def _render(
 ) -> Array:
     """Render with an error of at most ``allowed`` cps per pixel."""
     brightest = float(own_peak.max())
-    is_point, is_disc = sources.kind == "point", sources.kind == "uniform"
+    is_point, is_disc, imaged = (
+        sources.kind == "point",
+        sources.kind == "uniform",
+        is_image(sources),
+    )
+    lattice: Gaussians | None = None
+    if imaged.any():
+        pictures, picture_rate = sources.take(imaged), rate[imaged]
+        lattice = image_gaussians(pictures, picture_rate, allowed)
+        brightest = max(brightest, highest_gaussian(optics, pictures, picture_rate))
     sharp_edge = has_sharp_edge(
         optics, 0.1 * allowed / brightest, optics.extent + 50.0, optics.point_area
     )
     strength = _ring_strength(optics, sources, rate)
     # the rings of a disc go out from its edge
-    edge = np.where(is_disc, np.sqrt(2) * sources.r_half, 0.0)
+    edge = np.where(is_disc, np.sqrt(2) * sources.r_half, image_reach(sources))
     beyond = outside(shape, sources)
     clear = np.maximum(np.hypot(*beyond) - edge, 0.0)
     ringing = ~unseen(strength * psf_beyond(optics, clear), 0.05 * allowed)
 
     def distances(reach: float) -> tuple[float, tuple[float, float]]:
-        near = ~is_point | (np.maximum(*beyond) <= reach)
+        near = ~imaged & (~is_point | (np.maximum(*beyond) <= reach))
         rings = _distances(sources.take(near & ringing), shape)
-        return float(np.hypot(*rings)), _distances(sources.take(near), shape)
+        seen = _distances(sources.take(near), shape)
+        if lattice is not None:
+            far = _lattice_distances(lattice, shape)
+            rings = max(far[0], rings[0]), max(far[1], rings[1])
+            seen = max(far[0], seen[0]), max(far[1], seen[1])
+        return float(np.hypot(*rings)), seen
 
     plan = make_plan(
         optics,
@@ -148,17 +170,20 @@ def _render(
         int(is_point.sum()),
         int((~is_point).sum()),
         sharp_edge,
-        meshes_only=bool(np.any(sources.r_half[is_disc] > LARGEST_STAMP)),
+        meshes_only=lattice is not None or bool(np.any(sources.r_half[is_disc] > LARGEST_STAMP)),
     )
     share = 0.03 * allowed
+    smooth = ~(is_disc | imaged)
     gaussians = decompose(
-        sources.take(~is_disc),
-        rate[~is_disc],
-        plan.digits + 1.0 + np.log(np.minimum(own_peak[~is_disc] / brightest, 1.0)),
+        sources.take(smooth),
+        rate[smooth],
+        plan.digits + 1.0 + np.log(np.minimum(own_peak[smooth] / brightest, 1.0)),
         optics.moment(4 * NODES, np.inf if plan.near == "mesh" else BAND / plan.cell),
         share / np.sqrt(len(sources)),
         plan.near_cell if plan.near == "mesh" else plan.cell,
     )
+    if lattice is not None:
+        gaussians = join([gaussians, lattice])
     image = mesh_rate(plan, shape, gaussians, sources.take(is_disc), rate[is_disc], allowed)
     if sharp_edge:
         add_direct(image, plan, sources, rate)
@@ -180,6 +205,8 @@ def _ring_strength(optics: Optics, sources: SourceArrays, rate: Array) -> Array:
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
         chosen = sources.index == n
         strength[chosen] *= sersic_transform(float(n), q[chosen])
+    # the rings of an image are at most those of all its samples
+    strength *= image_excess(sources)
     return strength
 
 
@@ -208,8 +235,19 @@ def _distances(sources: SourceArrays, shape: tuple[int, int]) -> tuple[float, fl
     return distances[0], distances[1]
 
 
+def _lattice_distances(lattice: Gaussians, shape: tuple[int, int]) -> tuple[float, float]:
+    """Largest distances (y, x) in pixels between a Gaussian of an image and a pixel."""
+    distances = []
+    for p, n in zip((lattice.y, lattice.x), shape, strict=True):
+        distances.append(float(np.maximum(p, n - 1 - p).max(initial=0.0)))
+    return distances[0], distances[1]
+
+
 def peaks(optics: Optics, sources: SourceArrays, rate: Array) -> Array:
     """Estimate the highest pixel of each source alone, cps per pixel, shape (n,)."""
     size = np.pi * sources.r_half**2 * (1 - sources.ellipticity)
     # half of the light inside the half-light ellipse; cusps are higher, which is safe
-    return rate / (optics.point_area + 2 * size)
+    estimate: Array = rate / (optics.point_area + 2 * size)
+    for i in np.flatnonzero(is_image(sources)):
+        estimate[i] = image_peak(optics, sources.take(slice(i, i + 1)), float(rate[i]))
+    return estimate

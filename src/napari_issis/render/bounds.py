@@ -11,6 +11,7 @@ from scipy import special
 from ..psf import RadialPSF
 from ..sources import SourceArrays
 from .hankel import hankel_nodes
+from .images import image_excess, image_reach
 from .optics import Optics
 from .profiles import sersic_value
 
@@ -30,7 +31,9 @@ def brightest_pixels(
     """
     is_point = sources.kind == "point"
     distance = np.where(is_point, 1.0, 0.5) * np.hypot(*outside(shape, sources))
-    bound = rate * psf_beyond(optics, distance)
+    # an image ends somewhere, and half of the way from there is the PSF's too
+    ended = np.maximum(distance - 0.5 * image_reach(sources), 0.0)
+    bound = rate * image_excess(sources) * psf_beyond(optics, ended)
     ratio = 1 - sources.ellipticity
     for n in np.unique(sources.index[np.isfinite(sources.index)]):
         chosen = sources.index == n

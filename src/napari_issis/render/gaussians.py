@@ -28,7 +28,8 @@ class Gaussians:
     """Elliptical Gaussians; every array has shape (n,).
 
     ``x y`` are centres in pixels, ``rate`` the count rate of each, ``xx xy yy`` the covariance
-    in pixels squared, ``minor`` and ``major`` the standard deviations along the axes.
+    in pixels squared, ``minor`` and ``major`` the standard deviations along the axes. ``pitch``
+    is the spacing in pixels of equals that add up, as those of an image do, else infinite.
     """
 
     x: Array
@@ -39,6 +40,7 @@ class Gaussians:
     yy: Array
     minor: Array
     major: Array
+    pitch: Array
 
     def __len__(self) -> int:
         return self.x.size
@@ -70,13 +72,14 @@ def ellipse(x: Array, y: Array, rate: Array, major: Array, minor: Array, pa: Arr
         yy=(major * cos) ** 2 + (minor * sin) ** 2,
         minor=minor,
         major=major,
+        pitch=np.full_like(x, np.inf),
     )
 
 
 def points(x: Array, y: Array, rate: Array) -> Gaussians:
     """Gaussians of no width."""
     zero = np.zeros_like(x)
-    return Gaussians(x, y, rate, zero, zero, zero, zero, zero)
+    return Gaussians(x, y, rate, zero, zero, zero, zero, zero, np.full_like(x, np.inf))
 
 
 def decompose(
@@ -87,7 +90,7 @@ def decompose(
     allowed: float,
     cell: float,
 ) -> Gaussians:
-    """Points and Sersic profiles of a scene as Gaussians; uniform ellipses are left out.
+    """Points and Sersic profiles of a scene as Gaussians; uniform ellipses and images are not.
 
     Parameters
     ----------

@@ -159,8 +159,10 @@ def mesh_rate(
 
 def _digits(plan: Plan, gaussians: Gaussians, allowed: float) -> Array:
     """Natural logarithm of the accuracy that each Gaussian needs: faint ones need less."""
-    height = np.abs(gaussians.rate) / (
-        plan.optics.point_area + 2 * np.pi * gaussians.minor * gaussians.major
+    # where many overlap, it is their sum that is seen
+    height = np.abs(gaussians.rate) / np.minimum(
+        plan.optics.point_area + 2 * np.pi * gaussians.minor * gaussians.major,
+        gaussians.pitch**2,
     )
     with np.errstate(divide="ignore"):
         digits: Array = np.log(height / (SHARE * allowed))

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..psf import RadialPSF
-from ..sources import SourceArrays
+from ..sources import IMAGE, SourceArrays
 from .bounds import RADII, psf_envelope
 from .direct import has_sharp_edge
 from .discs import disc_half_sizes
 from .folding import fold_half, fold_rows
+from .images import image_gaussians
 from .optics import Optics
 from .profiles import sersic_value
 from .stamps import needed_limit, on_axes, transform
@@ -62,7 +63,7 @@ class MovingSource:
         self.kx = np.arange(mx + 1) / self.period[1]
         spectrum = optics.transfer(self.ky, self.kx) * rate
         if one.kind[0] != "point":
-            spectrum *= transform(one, self.ky, self.kx)
+            spectrum = spectrum * transform(one, self.ky, self.kx)
         self.spectrum = spectrum
 
     def add(self, image: Array, y: float, x: float) -> Window | None:
@@ -114,23 +115,37 @@ def half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> 
     Light arrives there from the source's outskirts and, by the PSF's wings, from its inner
     part. Either falls steeply, so that the distances where they fade add like squares.
     """
-    wing = _wing(optics, share / rate)
+    wing = point_reach(optics, share / rate)
     if one.kind[0] == "point":
         return int(wing) + 2, int(wing) + 2
-    if one.kind[0] == "uniform":
-        half_y, half_x = disc_half_sizes(one)
-        return int(half_y[0] + wing) + 2, int(half_x[0] + wing) + 2
-    n, ratio = float(one.index[0]), 1 - float(one.ellipticity[0])
-    r_half, pa = float(one.r_half[0]), float(np.radians(one.pa[0]))
-    r = np.geomspace(1e-3, 1e4, 1200)
-    bright = sersic_value(r, n) * rate / (r_half**2 * ratio) > share
-    major = r_half * float(r[bright].max(initial=0.0))
-    half_y = np.hypot(major * np.cos(pa), ratio * major * np.sin(pa))
-    half_x = np.hypot(major * np.sin(pa), ratio * major * np.cos(pa))
+    half_y, half_x = profile_half_sizes(one, share / rate)
+    if one.kind[0] in ("uniform", IMAGE):
+        return int(half_y + wing) + 2, int(half_x + wing) + 2
     return int(np.hypot(half_y, wing)) + 2, int(np.hypot(half_x, wing)) + 2
 
 
-def _wing(optics: Optics, level: float) -> float:
+def profile_half_sizes(one: SourceArrays, level: float) -> tuple[float, float]:
+    """Half-sizes (y, x) of the box around a profile of unit rate where it is above a level."""
+    if one.kind[0] == "uniform":
+        disc_y, disc_x = disc_half_sizes(one)
+        return float(disc_y[0]), float(disc_x[0])
+    if one.kind[0] == IMAGE:
+        lit = image_gaussians(one, np.ones(1), level)
+        faded = 5 * lit.major.max(initial=0.0)
+        far_y = np.abs(lit.y - one.y).max(initial=0.0)
+        far_x = np.abs(lit.x - one.x).max(initial=0.0)
+        return float(far_y + faded), float(far_x + faded)
+    n, ratio = float(one.index[0]), 1 - float(one.ellipticity[0])
+    r_half, pa = float(one.r_half[0]), float(np.radians(one.pa[0]))
+    r = np.geomspace(1e-3, 1e4, 1200)
+    bright = sersic_value(r, n) / (r_half**2 * ratio) > level
+    major = r_half * float(r[bright].max(initial=0.0))
+    half_y = np.hypot(major * np.cos(pa), ratio * major * np.sin(pa))
+    half_x = np.hypot(major * np.sin(pa), ratio * major * np.cos(pa))
+    return float(half_y), float(half_x)
+
+
+def point_reach(optics: Optics, level: float) -> float:
     """Distance in pixels beyond which a point source of unit rate stays below a level."""
     if not isinstance(optics.psf, RadialPSF):
         return optics.extent + 50.0

@@ -13,8 +13,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sources import SourceArrays
+from ..sources import IMAGE, SourceArrays
 from .discs import disc_half_sizes, elliptical_frequency
+from .images import image_amplitude, image_transform
 from .near import high_pass
 from .optics import Optics, Transfer
 from .plan import Plan
@@ -196,8 +197,10 @@ def _quadrant_filter(plan: Plan, half_y: int, half_x: int, limit: float) -> Tran
     return filtered
 
 
-def transform(one: SourceArrays, ky: Array, kx: Array) -> Array:
+def transform(one: SourceArrays, ky: Array, kx: Array) -> Transfer:
     """Transform of a source's unit-flux profile, centred, on the grid (ky, kx)."""
+    if one.kind[0] == IMAGE:
+        return image_transform(one, ky, kx)
     q = elliptical_frequency(
         ky, kx, float(one.r_half[0]), float(one.ellipticity[0]), float(one.pa[0])
     )
@@ -215,7 +218,9 @@ def needed_limit(
     modulus of the transfer function there.
     """
     amplitude = transfer
-    if one.kind[0] != "point":
+    if one.kind[0] == IMAGE:
+        amplitude = transfer * image_amplitude(one, k)
+    elif one.kind[0] != "point":
         angle = (np.arange(24) + 0.5) * (np.pi / 24) + np.radians(one.pa[0])
         stretch = np.hypot(np.cos(angle), (1 - one.ellipticity[0]) * np.sin(angle))
         q = 2 * np.pi * one.r_half[0] * np.outer(k, stretch)

@@ -1,0 +1,103 @@
+"""Fisher information of the counts of a frame on the parameters of all its sources."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from .render.derivatives import Derivatives
+from .render.small_products import square
+
+Array = NDArray[np.float64]
+
+# pixels; smaller tiles are more work for Python, larger ones for empty corners of windows
+TILE = 32
+
+
+def joint_information(
+    parts: Sequence[Derivatives | None], scale: Array, expected: Array, first: NDArray[np.intp]
+) -> csr_array:
+    """Sum the information over all pixels, those of a tile of the frame at once.
+
+    Parameters
+    ----------
+    parts : sequence of (Derivatives or None), of length n
+        Derivatives of the sources' images of 1 cps; None for those out of sight.
+    scale : ndarray, shape (m,)
+        What makes them derivatives of the count rate by the m parameters.
+    expected : ndarray, shape (ny, nx)
+        Count rate of sources and sky, cps per pixel.
+    first : ndarray, shape (n + 1,)
+        Each source's first parameter, and m.
+
+    Returns
+    -------
+    scipy.sparse.csr_array, shape (m, m)
+        F_ab = sum over pixels of (d lambda / d a) (d lambda / d b) / lambda, for 1 s.
+    """
+    root = np.sqrt(np.divide(1.0, expected, out=np.zeros_like(expected), where=expected > 0))
+    tiles = _tiles(parts)
+    most = max(
+        (sum(first[i + 1] - first[i] for i in members) for members in tiles.values()), default=0
+    )
+    room = np.empty(most * TILE * TILE)
+    rows, columns, data = [], [], []
+    for (top, left), members in tiles.items():
+        weight = root[top : top + TILE, left : left + TILE]
+        ids = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
+        stack = room[: ids.size * weight.size].reshape(ids.size, *weight.shape)
+        stack.fill(0.0)
+        at = 0
+        for i in members:
+            part = parts[i]
+            assert part is not None
+            y, x = part.window
+            y0, y1 = max(y.start, top), min(y.stop, top + TILE)
+            x0, x1 = max(x.start, left), min(x.stop, left + TILE)
+            inside = slice(y0 - top, y1 - top), slice(x0 - left, x1 - left)
+            own = part.images[:, y0 - y.start : y1 - y.start, x0 - x.start : x1 - x.start]
+            np.multiply(own, weight[inside], out=stack[(slice(at, at + len(own)), *inside)])
+            at += len(own)
+        product = square(stack.reshape(ids.size, -1))
+        product *= scale[ids]
+        product *= scale[ids][:, None]
+        rows.append(np.repeat(ids, ids.size))
+        columns.append(np.tile(ids, ids.size))
+        data.append(product.ravel())
+    m = int(first[-1])
+    if not data:
+        return csr_array((m, m))
+    indices = np.concatenate(rows), np.concatenate(columns)
+    joined = coo_array((np.concatenate(data), indices), shape=(m, m)).tocsr()
+    joined.sum_duplicates()
+    return joined
+
+
+def _tiles(parts: Sequence[Derivatives | None]) -> dict[tuple[int, int], list[int]]:
+    """First row and column of each tile, and the sources whose windows reach into it."""
+    tiles: dict[tuple[int, int], list[int]] = {}
+    for i, part in enumerate(parts):
+        if part is not None:
+            y, x = part.window
+            for top in range(y.start // TILE * TILE, y.stop, TILE):
+                for left in range(x.start // TILE * TILE, x.stop, TILE):
+                    tiles.setdefault((top, left), []).append(i)
+    return tiles
+
+
+def own_information(part: Derivatives, scale: Array, sky: float, darkest: float) -> Array:
+    """Information on the parameters of one source alone on the sky, shape (3 or 6, 3 or 6).
+
+    Its pixels are taken as no darker than ``darkest`` of the brightest one.
+    """
+    images = part.images.reshape(len(part.images), -1)
+    expected = np.maximum(scale[1] * images[0] + sky, 0.0)
+    brightest = float(expected.max())
+    if not brightest > 0:
+        return np.zeros((len(images), len(images)))
+    weighted = images / np.maximum(expected, darkest * brightest)
+    result: Array = (weighted @ images.T) * scale * scale[:, None]
+    return result

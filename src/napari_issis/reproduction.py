@@ -1,0 +1,154 @@
+"""The Python commands that make a scene and its exposures again, count by count."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.coordinates import SkyCoord
+from astropy.table import Table
+
+from .detector import Detector
+from .filters import Filter
+from .observation import Observation
+from .psf import GaussianPSF, MoffatPSF, TelescopePSF
+from .sky import SKIES, PaperSky, Sky
+from .sources import COLUMNS, FLUX_UNIT, spectrum_texts
+
+# Units that a plain number of a source table has.
+PLAIN = {"x": u.pix, "y": u.pix, "flux": FLUX_UNIT, "r_half": u.pix, "pa": u.deg}
+# Samples of a filter's curve that are written out.
+LONGEST_CURVE = 64
+
+
+def reproduction_code(
+    sources: Table,
+    observations: Sequence[Observation],
+    *,
+    seed: int = 0,
+    goals: Sequence[Mapping[str, Any]] = (),
+) -> str:
+    """Python that makes the exposures of a scene again.
+
+    Parameters
+    ----------
+    sources : astropy.table.QTable
+        A valid source table; its values are written with all their digits.
+    observations : sequence of Observation
+        The set-ups.
+    seed : int
+        Seed of the noise.
+    goals : sequence of mapping
+        Arguments of `exposure_for`.
+
+    Returns
+    -------
+    str
+        It defines ``sources``, ``observations`` and ``exposures``. A set-up that cannot be
+        written in a few lines, such as a PSF that is an image, is read from the FITS file of
+        its exposure, which has to be saved beside.
+    """
+    body = [*_sources(sources), "observations = ["]
+    body += [f"    {_observation(one)}" for one in observations]
+    body += [
+        "]",
+        f"exposures = [ni.simulate(sources, one, seed={int(seed)}) for one in observations]",
+        "for observation, exposure in zip(observations, exposures):",
+        "    print(observation.channel, exposure.counts.sum())",
+        "    print(ni.forecast(sources, observation))",
+    ]
+    body += [
+        f"    print(ni.exposure_for(sources, observation, {_arguments(goal)}))" for goal in goals
+    ]
+    text = "\n".join(body)
+    head = ["from math import inf, nan"] if "nan" in text or "inf" in text else []
+    if "u." in text:
+        head.append("import astropy.units as u")
+    if "SkyCoord(" in text:
+        head.append("from astropy.coordinates import SkyCoord")
+    head += ["from astropy.table import QTable", "import napari_issis as ni"]
+    return "\n".join([*head, "", text, ""])
+
+
+def unwritten(observation: Observation) -> str | None:
+    """Name what of an observation cannot be written as a line of Python; None if nothing is."""
+    psf = observation.psf
+    if psf is not None and type(psf) not in (GaussianPSF, MoffatPSF, TelescopePSF):
+        return f"the PSF, {type(psf).__name__}"
+    for one in observation.filters:
+        if isinstance(one, Filter) and one.wavelength.size > LONGEST_CURVE:
+            return f"the curve of the filter {one.name}"
+    if observation.sky not in SKIES.values() and type(observation.sky) is not Sky:
+        return f"the sky, {type(observation.sky).__name__}"
+    return None
+
+
+def _sources(table: Table) -> list[str]:
+    names = [name for name in (*COLUMNS, "n") if name in table.colnames]
+    columns = [_values(table, name) for name in names]
+    spectra = spectrum_texts(table)
+    if spectra is not None:
+        names.append("spectrum")
+        columns.append([repr(str(text)) for text in spectra])
+    rows = [f"        ({', '.join(row)})," for row in zip(*columns, strict=True)]
+    heading = ", ".join(repr(name) for name in names)
+    if not rows:
+        return ['sources = ni.source("point", 0.0, 0.0)[:0]']
+    lines = ["sources = QTable(", "    rows=[", *rows, "    ],", f"    names=({heading}),", ")"]
+    for name, plain in PLAIN.items():
+        unit = getattr(table[name], "unit", None) if name in names else None
+        if unit is not None and unit != plain:
+            lines.append(f'sources["{name}"] = list(sources["{name}"]) * u.Unit({str(unit)!r})')
+    return lines
+
+
+def _values(table: Table, name: str) -> list[str]:
+    column = table[name]
+    if name == "kind":
+        return [repr(str(kind).strip()) for kind in column]
+    mask = np.asarray(getattr(column, "mask", np.zeros(len(table), dtype=bool)))
+    values = np.asarray(getattr(column, "value", column))
+    return [repr(np.nan if gone else float(v)) for v, gone in zip(values, mask, strict=True)]
+
+
+def _observation(observation: Observation) -> str:
+    missing = unwritten(observation)
+    if missing is not None:
+        name = f"{observation.channel}.fits"
+        return f"ni.Exposure.read({name!r}).observation,  # {missing}, is in that file"
+    words = [f"channel={observation.channel!r}"]
+    for field in fields(observation):
+        value = getattr(observation, field.name)
+        if field.name == "channel" or (value is not None and value == field.default):
+            continue
+        if value is not None:
+            words.append(f"{field.name}={_value(value)}")
+    return f"ni.Observation({', '.join(words)}),"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, SkyCoord):
+        ra, dec = float(value.icrs.ra.deg), float(value.icrs.dec.deg)
+        return f'SkyCoord({ra!r}, {dec!r}, unit="deg")'
+    if isinstance(value, tuple):
+        return f"({', '.join(_value(one) for one in value)})"
+    if isinstance(value, Filter):
+        curve = value.wavelength.tolist(), value.transmission.tolist()
+        return f"ni.Filter({value.name!r}, {curve[0]!r}, {curve[1]!r})"
+    if isinstance(value, Sky | PaperSky):
+        known = [key for key, sky in SKIES.items() if sky == value]
+        return f"ni.SKIES[{known[0]!r}]" if known else f"ni.{value!r}"
+    if isinstance(value, GaussianPSF | MoffatPSF | TelescopePSF | Detector):
+        return f"ni.{value!r}"
+    if isinstance(value, u.Quantity):
+        return f"{float(value.value)!r} * u.Unit({str(value.unit)!r})"
+    if isinstance(value, np.ndarray | np.generic):
+        return repr(value.tolist())
+    return repr(value)
+
+
+def _arguments(goal: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name}={_value(value)}" for name, value in goal.items())

@@ -1,0 +1,108 @@
+"""Panel, list and both traces on a screen of 1366 x 768, with the frame whole."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from qtpy.QtTest import QTest
+from small_scene import SMALL, few_sources
+
+from napari_issis.plugin.canvas_geometry import find_window, to_view_box
+from napari_issis.plugin.dock import SimulatorWidget
+from napari_issis.plugin.panels import LIST_NAME, ROW_NAME, _dock_of
+from napari_issis.plugin.scene import open_scene
+from napari_issis.plugin.trace_docks import show_traces
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::napari_issis.CountRateWarning"),
+    pytest.mark.needs_gl,
+]
+
+
+@pytest.fixture
+def panel(make_napari_viewer):
+    viewer = make_napari_viewer(show=True)
+    viewer.window.resize(1366, 740)
+    scene = open_scene(few_sources(), SMALL, viewer=viewer, dock=False)
+    panel = SimulatorWidget(viewer)
+    viewer.window.add_dock_widget(panel, name="panel")
+    scene.wait()
+    QTest.qWait(200)
+    panel.view.zoom.fit()
+    return panel
+
+
+def corners(panel):
+    """Corners of the frame as shares of the canvas."""
+    scene = panel.scene
+    ny, nx = scene.counts.layer.data.shape
+    places = [
+        to_view_box(scene.viewer, scene.counts.layer, (y, x))
+        for y in (-0.5, ny - 0.5)
+        for x in (-0.5, nx - 0.5)
+    ]
+    height, width = scene.viewer.canvas.size
+    return np.array(places) / (width, height)
+
+
+def is_whole(panel):
+    return bool(np.all((corners(panel) >= -0.01) & (corners(panel) <= 1.01)))
+
+
+def span(panel):
+    """How much of the canvas the frame fills in the direction that fits less well."""
+    return float(np.ptp(corners(panel), axis=0).max())
+
+
+def test_the_frame_stays_whole(panel):
+    """Catches a list that crops the frame, and a frame that stays small when it is closed."""
+    assert is_whole(panel)
+    full = span(panel)
+    steps = (
+        panel.toggle_list,
+        lambda: show_traces(panel.scene.viewer),
+        panel.toggle_list,
+        lambda: show_traces(panel.scene.viewer, False),
+    )
+    sizes = [panel.scene.viewer.canvas.size]
+    for step in steps:
+        step()
+        QTest.qWait(300)
+        assert is_whole(panel)
+        assert span(panel) == pytest.approx(full, abs=0.03)
+        sizes.append(panel.scene.viewer.canvas.size)
+    # it was the panels that changed the canvas
+    assert sizes[1][0] < sizes[0][0] - 50
+    assert sizes[2][1] < sizes[1][1] - 50
+
+
+def test_a_view_that_was_zoomed_stays(panel):
+    """Catches a zoom that is lost whenever a panel opens."""
+    panel.view.zoom.to(4)
+    camera = panel.scene.viewer.scene.camera
+    zoom, centre = camera.zoom, camera.center
+    panel.toggle_list()
+    QTest.qWait(300)
+    assert (camera.zoom, camera.center) == (zoom, centre)
+
+
+@pytest.mark.parametrize("list_first", [True, False])
+def test_list_and_traces_together(panel, list_first):
+    """Catches a row trace beside the list, where it has not the width of the canvas."""
+    steps = [panel.toggle_list, lambda: show_traces(panel.scene.viewer)]
+    for step in steps if list_first else steps[::-1]:
+        step()
+        QTest.qWait(300)
+    window = find_window(panel)
+    docked = panel.scene.viewer.window.dock_widgets
+    row, listed = (
+        _dock_of(next(docked[name] for name in docked if name.startswith(title)))
+        for title in (ROW_NAME, LIST_NAME)
+    )
+    assert row.geometry().bottom() <= listed.geometry().top() + 1
+    assert row.width() == listed.width()
+    canvas = window.centralWidget()
+    assert row.geometry().left() <= canvas.geometry().left()
+    assert row.geometry().right() >= canvas.geometry().right() - 1
+    assert canvas.height() > 0.5 * window.height()
+    assert window.height() <= 768
