@@ -204,7 +204,7 @@ def _settings(results: Sequence[ChannelResult], labels: Sequence[str]) -> str:
             ),
             ("Count rate of 1e-16 erg s⁻¹ cm⁻² Å⁻¹", f"{1e-16 * one.cps_per_flux:.4g} cps"),
             ("Sky", f"{one.sky_rate:.3g} cps per pixel: {sky_description(one)}"),
-            ("Dark rate", f"{one.dark:.3g} cps per pixel"),
+            ("Dark rate", f"{one.dark_rate:.3g} cps per pixel"),
             ("Detector", _detector(one)),
             ("Sources in the frame", f"{result.source_rate:.4g} cps"),
             ("Expected background", f"{exposure.background:.3g} counts per pixel"),
