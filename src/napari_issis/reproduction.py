@@ -13,10 +13,12 @@ from astropy.table import Table
 
 from .detector import Detector
 from .filters import Filter
+from .instrument import Instrument
+from .instruments import INSTRUMENTS, ISSIS, instrument_named
 from .observation import Observation
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .sky import SKIES, PaperSky, Sky
-from .sources import COLUMNS, FLUX_UNIT, spectrum_texts
+from .sources import COLUMNS, FLUX_UNIT, IMAGE, spectrum_texts
 
 # Units that a plain number of a source table has.
 PLAIN = {"x": u.pix, "y": u.pix, "flux": FLUX_UNIT, "r_half": u.pix, "pa": u.deg}
@@ -51,7 +53,7 @@ def reproduction_code(
         written in a few lines, such as a PSF that is an image, is read from the FITS file of
         its exposure, which has to be saved beside.
     """
-    body = [*_sources(sources), "observations = ["]
+    body = [*_sources(sources, observations[0].channel), "observations = ["]
     body += [f"    {_observation(one)}" for one in observations]
     body += [
         "]",
@@ -81,12 +83,29 @@ def unwritten(observation: Observation) -> str | None:
     for one in observation.filters:
         if isinstance(one, Filter) and one.wavelength.size > LONGEST_CURVE:
             return f"the curve of the filter {one.name}"
-    if observation.sky not in SKIES.values() and type(observation.sky) is not Sky:
+    if _name_of(observation.instrument) is None:
+        return f"the camera, {observation.instrument.name}"
+    own = observation.sky == _plain(observation).sky
+    if not own and observation.sky not in SKIES.values() and type(observation.sky) is not Sky:
         return f"the sky, {type(observation.sky).__name__}"
     return None
 
 
-def _sources(table: Table) -> list[str]:
+def unwritten_sources(table: Table) -> bool:
+    """Tell whether sources cannot be written as lines of Python, as images cannot."""
+    return IMAGE in table["kind"]
+
+
+def _name_of(camera: Instrument) -> str | None:
+    return next((name for name in INSTRUMENTS if instrument_named(name) == camera), None)
+
+
+def _plain(observation: Observation) -> Observation:
+    """Return the observation of that camera and channel of which nothing else is said."""
+    return Observation(channel=observation.channel, instrument=observation.instrument)
+
+
+def _sources(table: Table, channel: str) -> list[str]:
     names = [name for name in (*COLUMNS, "n") if name in table.colnames]
     columns = [_values(table, name) for name in names]
     spectra = spectrum_texts(table)
@@ -95,6 +114,8 @@ def _sources(table: Table) -> list[str]:
         columns.append([repr(str(text)) for text in spectra])
     rows = [f"        ({', '.join(row)})," for row in zip(*columns, strict=True)]
     heading = ", ".join(repr(name) for name in names)
+    if unwritten_sources(table):
+        return [f"sources = ni.Exposure.read({channel + '.fits'!r}).sources"]
     if not rows:
         return ['sources = ni.source("point", 0.0, 0.0)[:0]']
     lines = ["sources = QTable(", "    rows=[", *rows, "    ],", f"    names=({heading}),", ")"]
@@ -119,12 +140,14 @@ def _observation(observation: Observation) -> str:
     if missing is not None:
         name = f"{observation.channel}.fits"
         return f"ni.Exposure.read({name!r}).observation,  # {missing}, is in that file"
-    words = [f"channel={observation.channel!r}"]
+    words, plain = [f"channel={observation.channel!r}"], _plain(observation)
+    if observation.instrument != ISSIS:
+        words.append(f"instrument={_name_of(observation.instrument)!r}")
     for field in fields(observation):
         value = getattr(observation, field.name)
-        if field.name == "channel" or (value is not None and value == field.default):
+        if field.name in ("channel", "instrument") or value is None:
             continue
-        if value is not None:
+        if value != getattr(plain, field.name):
             words.append(f"{field.name}={_value(value)}")
     return f"ni.Observation({', '.join(words)}),"
 

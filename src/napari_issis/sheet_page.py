@@ -18,7 +18,7 @@ from .fits_light_path import sky_description
 from .observation import Observation
 from .photometry import ab_magnitude
 from .psf import RadialPSF, fwhm
-from .reproduction import reproduction_code, unwritten
+from .reproduction import reproduction_code, unwritten, unwritten_sources
 from .sheet_pictures import image_svg, model_svg
 from .source_counts import expected_counts
 from .source_rates import flux_pivots, sources_and_rates
@@ -325,6 +325,11 @@ def _assumptions(results: Sequence[ChannelResult], added: str) -> list[str]:
     texts += [f"{name}: {camera.filter_note}" for name in curves]
     if added:
         texts.append(f"{added} was added with the same exposure time and its own PSF and sky.")
+    if unwritten_sources(results[0].exposure.sources):
+        texts.append(
+            "Sources that are images cannot be written on this page: the commands read all "
+            f"sources from {observations[0].channel}.fits, the saved exposure."
+        )
     for one in observations:
         missing = unwritten(one)
         if missing is not None:
