@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import MISSING
+from functools import partial
 from pathlib import Path
 
 import napari_issis as ni
 from napari_issis.encircled_energy import encircled_energy
-from napari_issis.instruments import ISSIS
+from napari_issis.facts import Fact, facts_of, numbers
+from napari_issis.instrument import Channel
+from napari_issis.instruments import ISSIS, instrument_named
 from napari_issis.psf import fwhm
 from napari_issis.sky import SKIES, paper_estimate
-from napari_issis.sky_tables import EARTHSHINE, LINES, ZODIACAL
+from napari_issis.sky_tables import (
+    EARTHSHINE,
+    EARTHSHINE_HIGH,
+    LINES,
+    WAVELENGTH,
+    ZODIACAL,
+    ZODIACAL_HIGH,
+)
 
-CHANNELS, FILTERS, ILLUSTRATIVE_FILTERS = ISSIS.channels, ISSIS.neutral_filters, ISSIS.filter_curves
-NUV = CHANNELS["NUV"]
+CHANNELS = ISSIS.channels
 PAGE = Path(__file__).with_name("instrument.md")
 Rows = list[list[str]]
 CIRCLES = (0.1, 0.2, 0.5, 1.0)
@@ -25,8 +35,12 @@ def channels() -> Rows:
     rows = [["quantity", *CHANNELS, "status"]]
     bands = [ni.Observation(name).passband for name in CHANNELS]
     for label, values, status in (
-        ("band (A)", ["{:g} to {:g}".format(*b.band) for b in bands], "paper"),
-        ("cps for 1 erg s-1 cm-2 A-1", [f"{b.cps_per_flux:.3g}" for b in bands], "paper"),
+        ("band (A)", ["{:g} to {:g}".format(*b.band) for b in bands], _status("band")),
+        (
+            "cps for 1 erg s-1 cm-2 A-1",
+            [f"{b.cps_per_flux:.3g}" for b in bands],
+            _status("cps_per_flux"),
+        ),
         ("mean effective area (cm2)", [f"{b.area:.1f}" for b in bands], "derived"),
         ("its shape over the band", ["constant"] * 2, "assumed"),
         ("pivot wavelength (A)", [f"{c.pivot:.1f}" for c in CHANNELS.values()], "derived"),
@@ -35,7 +49,11 @@ def channels() -> Rows:
             [f"{_magnitude(name):.2f}" for name in CHANNELS],
             "derived",
         ),
-        ("pixel (arcsec)", [f"{NUV.pixel_scale}"] * 2, "paper"),
+        (
+            "pixel (arcsec)",
+            [f"{c.pixel_scale}" for c in CHANNELS.values()],
+            _status("pixel_scale"),
+        ),
     ):
         rows.append([label, *values, status])
     return rows
@@ -89,6 +107,15 @@ def paper_sky() -> Rows:
     return rows
 
 
+def continua() -> Rows:
+    """Tabulated continua of the sky at their high levels."""
+    rows = [["A", "earthshine high", "zodiacal light high", "status"]]
+    for row in zip(WAVELENGTH, EARTHSHINE_HIGH, ZODIACAL_HIGH, strict=True):
+        wavelength, *fluxes = row
+        rows.append([f"{wavelength:g}", *(f"{flux:.2e}" for flux in fluxes), "handbook"])
+    return rows
+
+
 def levels() -> Rows:
     """Levels of the continuum."""
     rows = [["component", "level", "share of the high one", "status"]]
@@ -101,20 +128,25 @@ def levels() -> Rows:
 
 def lines() -> Rows:
     """Surface brightness of the geocoronal lines."""
-    rows = [["line", "A", "high orbit", "low", "average", "high"]]
+    rows = [["line", "A", "high orbit", "low", "average", "high", "status"]]
+    status = {
+        "Ly-alpha 1216": "handbook; high orbit: assumed",
+        "[O II] 2471": "handbook",
+    }
     for one in LINES:
         fluxes = (one.high_orbit, one.low, one.average, one.high)
-        rows.append([one.name, f"{one.wavelength:g}", *(f"{flux:.3g}" for flux in fluxes)])
+        of_line = status.get(one.name, "handbook; low: from memory")
+        rows.append([one.name, f"{one.wavelength:g}", *(f"{flux:.3g}" for flux in fluxes), of_line])
     return rows
 
 
 def filters() -> Rows:
     """List what each filter passes of a flat spectrum and of the sky."""
     rows = [["filter", "channel", "flat spectrum", "pivot (A)", "CIS sky (cps/px)", "status"]]
-    for name in (*FILTERS, *ILLUSTRATIVE_FILTERS):
-        status = "paper" if name in FILTERS else "illustrative"
+    for name in ISSIS.filter_names:
+        status = "illustrative" if ISSIS.is_illustrative(name) else "paper"
         for channel in CHANNELS:
-            if name in ILLUSTRATIVE_FILTERS and channel != _made_for(name):
+            if ISSIS.is_illustrative(name) and channel != _made_for(name):
                 continue
             one = ni.Observation(channel, (name, "open"))
             rows.append(
@@ -126,16 +158,54 @@ def filters() -> Rows:
     return rows
 
 
-def detector() -> Rows:
-    """Limits of a photon-counting detector."""
+def numbers_of(camera: str) -> Rows:
+    """List every number of a camera with its unit, status and source, as its file has them."""
+    rows = [["of", "number", "value", "unit", "status", "source"]]
+    instrument = instrument_named(camera)
+    every = {name: facts_of(one) for name, one in instrument.channels.items()}
+    first = next(iter(every.values()))
+    shared = {
+        key: fact
+        for key, fact in first.items()
+        if len(every) > 1 and all(one.get(key) == fact for one in every.values())
+    }
+    rows += [_row("all channels", key, fact) for key, fact in shared.items()]
+    for name, facts in every.items():
+        rows += [_row(name, key, fact) for key, fact in facts.items() if key not in shared]
+    for name, one in instrument.filters.items():
+        rows += [_row(name, key, fact) for key, fact in facts_of(one).items()]
+    return rows
+
+
+def channel_fields() -> Rows:
+    """List the numbers that a channel may have."""
+    rows = [["number of a channel", "unit", "how many", "least", "most", "needed"]]
+    for one, allowed in numbers(Channel):
+        count = {1: "1", 2: "2", None: "a list"}[allowed.count]
+        least = f"above {allowed.low:g}" if allowed.above else f"{allowed.low:g}"
+        needed = "yes" if one.default is MISSING else ""
+        if one.name in ("cps_per_flux", "effective_area"):
+            needed = "one of the two"
+        rows.append([f"`{one.name}`", allowed.unit, count, least, f"{allowed.high:g}", needed])
+    return rows
+
+
+def sources_of(camera: str) -> Rows:
+    """List what the short names of a camera's sources stand for."""
     return [
-        ["quantity", "value", "status"],
-        ["local count-rate limit (cps per pixel)", f"{NUV.local_limit:g}", "HST ACS/SBC"],
-        ["global count-rate limit (cps)", f"{NUV.total_limit:g}", "HST ACS/SBC"],
-        ["dark rate (cps per pixel)", f"{ni.Observation().dark_rate:g}", "paper"],
-        ["clear aperture (m)", f"{NUV.diameter:g}", "published"],
-        ["linear obscuration", f"{NUV.obscuration:g}", "assumed"],
+        ["short", "source"],
+        *([k, text] for k, text in instrument_named(camera).sources.items()),
     ]
+
+
+def _row(of: str, key: str, fact: Fact) -> list[str]:
+    values = fact.value if isinstance(fact.value, tuple) else (fact.value,)
+    value = ", ".join(f"{one:.12g}" for one in values)
+    return [of, f"`{key}`", value, fact.unit, fact.status, fact.source]
+
+
+def _status(key: str) -> str:
+    return "; ".join(dict.fromkeys(facts_of(one)[key].status for one in CHANNELS.values()))
 
 
 TABLES: dict[str, Callable[[], Rows]] = {
@@ -144,9 +214,16 @@ TABLES: dict[str, Callable[[], Rows]] = {
     "skies": skies,
     "paper": paper_sky,
     "levels": levels,
+    "continua": continua,
     "lines": lines,
     "filters": filters,
-    "detector": detector,
+    "issis_sources": partial(sources_of, "ISSIS"),
+    "issis": partial(numbers_of, "ISSIS"),
+    "fcu_sources": partial(sources_of, "FCU"),
+    "fcu": partial(numbers_of, "FCU"),
+    "sbc_sources": partial(sources_of, "ACS/SBC"),
+    "fields": channel_fields,
+    "sbc": partial(numbers_of, "ACS/SBC"),
 }
 
 

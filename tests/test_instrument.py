@@ -459,3 +459,14 @@ def test_a_camera_on_the_command_line(path, tmp_path, capsys):
         with pytest.raises(SystemExit):
             main(["simulate", "blend", *wrong, "--output", str(tmp_path / "y.fits")])
         assert message in capsys.readouterr().err
+
+
+def test_an_image_as_a_source_has_its_size_in_the_cameras_pixels(mine):
+    """Samples of 0.2 arcsec on pixels of 0.1: 20 samples apart are 40 pixels apart."""
+    samples = np.zeros((31, 31))
+    samples[15, 5] = samples[15, 25] = 1.0
+    one = ni.image_source(samples, 32, 32, 1e-14, pixel_scale=0.2, frame_pixel_scale=0.1)
+    observation = ni.Observation(instrument=mine, shape=(65, 65), psf=ni.GaussianPSF(0.3))
+    row = ni.count_rate(one, observation)[32]
+    peaks = [int(np.argmax(row[:32])), 32 + int(np.argmax(row[32:]))]
+    assert peaks == [12, 52]

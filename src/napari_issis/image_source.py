@@ -38,6 +38,7 @@ def image_source(
     mirrored: bool = False,
     hdu: int | str | None = None,
     spectrum: str | Spectrum | None = None,
+    frame_pixel_scale: float = PIXEL_SCALE,
 ) -> QTable:
     """Make a source table of one row whose light is distributed as in an image.
 
@@ -63,6 +64,8 @@ def image_source(
         Number or name of the file's extension; by default the first with an image.
     spectrum : str or Spectrum, optional
         One spectrum for the whole image, as for `napari_issis.source`.
+    frame_pixel_scale : float
+        Arcsec per pixel of the frame, by default that of ISSIS; `Observation.pixel_scale`.
 
     Returns
     -------
@@ -114,6 +117,7 @@ def image_source(
         if hdu is not None:
             raise ValueError(f"hdu is {hdu!r}, but an array has no extensions.")
     scale = positive("pixel_scale", pixel_scale, "arcsec per pixel")
+    frame = positive("frame_pixel_scale", frame_pixel_scale, "arcsec per pixel")
     light = SourceImage(np.fliplr(samples) if mirrored else samples, name)
     if light.negative_light > MOST_NEGATIVE:
         warnings.warn(
@@ -128,7 +132,7 @@ def image_source(
         "x": [x],
         "y": [y],
         "flux": np.atleast_1d(flux if hasattr(flux, "unit") else flux * FLUX_UNIT),
-        "r_half": [light.r_half * scale / PIXEL_SCALE] * u.pix,
+        "r_half": [light.r_half * scale / frame] * u.pix,
         "ellipticity": [0.0],
         "pa": np.atleast_1d(pa if hasattr(pa, "unit") else pa * u.deg),
         "image": [keep(light)],

@@ -52,6 +52,7 @@ def test_the_panel_offers_what_the_camera_has(scene, form):
     labels = [form.frame.native.itemText(i) for i in range(form.frame.native.count())]
     assert "1024 × 1024 (32.8″)" in labels
     assert "1700 Å" in form.channel.native.currentText()
+    assert "FUV  1150–1700 Å" in form.channel.tooltip
     assert "ACS/SBC" in form.psf.text()
     assert "28 %" in form.psf.toolTip()
     form.camera.value = ISSIS

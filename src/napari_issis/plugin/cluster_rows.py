@@ -43,7 +43,7 @@ class ClusterRows:
             "radius",
             default.radius,
             "Projected half-number radius: semi-major axis of the ellipse that holds half of the "
-            "stars (a pixel is 0.036″)",
+            "stars",
             LengthScale(),
             check=lambda radius: ClusterProfile(radius=radius),
         )

@@ -149,6 +149,8 @@ class InstrumentForm(Form):
                 (self.channel, _channels(observation)),
             ):
                 _offer(widget, choices)
+            bands = ", ".join(label for label, _ in _channels(observation))
+            self.channel.tooltip = f"Channel of the camera and its spectral range: {bands}"
         for widget, choices in (
             (self.camera, _cameras(observation)),
             (self.wheel1, _filters(observation)),

@@ -51,7 +51,7 @@ MODES = (
     ("image from a file", "image"),
 )
 FLUX_HELP = "Flux F, averaged over the channel, or AB magnitude"
-R_HELP = "Semi-major axis of the ellipse that holds half of the light (a pixel is 0.036″)"
+R_HELP = "Semi-major axis of the ellipse that holds half of the light"
 E_HELP = "Ellipticity 1 − b/a, from 0 to below 1"
 PA_HELP = "Position angle of the major axis, degrees from up, counter-clockwise"
 N_HELP = "Sérsic index, 0.5 to 8"
@@ -268,6 +268,7 @@ class SourceForm(Form):
                 y=self.y.number,
                 flux=self.flux.number,
                 pa=self.pa.number,
+                frame_pixel_scale=self.scene.observation.pixel_scale,
                 **self.image.options(),
             )
         kind = self.kind.value
