@@ -12,6 +12,7 @@ from ..source_rates import sources_and_rates
 from ..sources import SourceArrays
 from .bounds import brightest_pixels, outside, psf_beyond, unseen
 from .direct import add_direct, has_sharp_edge
+from .fine_mesh import fine_meshes
 from .gaussians import NODES, decompose
 from .meshes import LARGEST_DISC, mesh_rate
 from .optics import Optics
@@ -157,7 +158,7 @@ def _render(
         plan.digits + 1.0 + np.log(np.minimum(own_peak[~is_disc] / brightest, 1.0)),
         optics.moment(4 * NODES, np.inf if plan.near == "mesh" else BAND / plan.cell),
         share / np.sqrt(len(sources)),
-        plan.near_cell if plan.near == "mesh" else plan.cell,
+        fine_meshes(plan)[0].cell if plan.near == "mesh" else plan.cell,
     )
     image = mesh_rate(plan, shape, gaussians, sources.take(is_disc), rate[is_disc], allowed)
     if sharp_edge:

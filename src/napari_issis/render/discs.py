@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from ..sources import SourceArrays
-from .plan import spread_cut
+from .spreading import spread_cut
 from .profiles import disc_transform
 
 Array = NDArray[np.float64]
