@@ -337,7 +337,7 @@ def test_kernel_wraps_around_only_where_nobody_looks(seen):
     optics = Optics(TELESCOPE, PIXEL)
     farthest = float(np.hypot(*seen))
     shape = tuple(int(d) + 1 for d in seen)
-    plan = make_plan(optics, shape, 1e-10, 1e-11, lambda reach: (farthest, seen), 100000, 0)
+    plan = make_plan(optics, shape, 1e-10, 1e-11, lambda reach: (farthest, seen), 10000, 0)
     assert plan.wraps
     low, high = -5.0, np.array(shape) + 4.0
     _, mesh = fine_meshes(plan)

@@ -29,7 +29,6 @@ from .threads import blocks, for_each
 from .wrapping import wrapped_transfer
 
 Array = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 
 # points of the mesh, some 5 GB of memory in all
 LARGEST_MESH = 5e8
@@ -39,7 +38,7 @@ NEAR = Band(-1, -1, 0)
 ROWS = 16
 COLUMNS = 16
 # Natural logarithm of the accuracy needed in a Gaussian's rings below which they are left out
-FEWEST_RING_DIGITS = -3.0
+FEWEST_RING_DIGITS = 0.0
 
 
 @dataclass(frozen=True)
@@ -222,9 +221,8 @@ def _at_pixels(rows: Array, y: Axis, x: Axis, filtered: Transfer, shape: tuple[i
 
     for_each(transform_rows, blocks(y.painted, ROWS))
     radial = filtered.shape[0] == y.modes + 1
-    in_y, in_x = (
-        (np.arange(n) - axis.start) % axis.period for n, axis in zip(shape, (y, x), strict=True)
-    )
+    # a mesh starts before the frame and ends behind it
+    in_y, in_x = (slice(-axis.start, n - axis.start) for n, axis in zip(shape, (y, x), strict=True))
     # in the place of columns that have been transformed
     inverted = half[: shape[0], : x.modes + 1]
 

@@ -94,7 +94,8 @@ def cut_filter(plan: Plan, band: Band) -> Lookup:
     end, width = plan.ring_end(band.level), plan.ring_width
     step = 0.5 / (TABLE * end)
     least = int(np.ceil(1.05 * plan.highest / (KEPT * step))) + 1
-    k = step * np.arange(KEPT * int(fft.next_fast_len(least, real=True)) + 1)
+    k = np.arange(KEPT * int(fft.next_fast_len(least, real=True)) + 1, dtype=np.float64)
+    k *= step
     x = np.arange(k.size) * 0.5 / k[-1]
     filtered = np.empty_like(k)
     for block in blocks(k.size, 2**14):  # temporary arrays stay small
