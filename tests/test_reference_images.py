@@ -46,6 +46,16 @@ def test_error_is_within_the_tolerance(name, tolerance):
     assert np.abs(image - expected).max() <= tolerance * expected.max()
 
 
+def test_last_digits_of_galaxies():
+    """The image whose reference is good to 1e-11 of the peak and that needs rings of galaxies.
+
+    Catches galaxies painted with too few digits where rings have a mesh of their own.
+    """
+    table, observation, expected = load("exponential100_telescope")
+    image = ni.count_rate(table, observation, tolerance=1e-10)
+    assert np.abs(image - expected).max() <= 1e-10 * expected.max()
+
+
 def test_cheap_accuracy_is_cheap():
     """At 1e-3 the digits of 1e-6 are not paid for: the error is that of a coarser render."""
     table, observation, expected = load("mixed9_telescope")

@@ -7,6 +7,7 @@ from scipy import integrate, special
 
 import napari_issis as ni
 from napari_issis.render import render
+from napari_issis.render.fine_mesh import fine_meshes
 from napari_issis.render.near import NEAR
 from napari_issis.render.optics import Optics
 from napari_issis.render.plan import make_plan
@@ -336,12 +337,13 @@ def test_kernel_wraps_around_only_where_nobody_looks(seen):
     optics = Optics(TELESCOPE, PIXEL)
     farthest = float(np.hypot(*seen))
     shape = tuple(int(d) + 1 for d in seen)
-    plan = make_plan(optics, shape, 1e-10, 1e-11, lambda reach: (farthest, seen), 100000, 0)
+    plan = make_plan(optics, shape, 1e-10, 1e-11, lambda reach: (farthest, seen), 10000, 0)
     assert plan.wraps
     low, high = -5.0, np.array(shape) + 4.0
-    periods = [8 * int(np.ceil(plan.near_period(i, shape[i], low, high[i]) / 8)) for i in (0, 1)]
+    _, mesh = fine_meshes(plan)
+    periods = [8 * int(np.ceil(mesh.period(i, shape[i], low, high[i]) / 8)) for i in (0, 1)]
     assert all(p < 2 * d + 100 for p, d in zip(periods, seen, strict=True))
-    transfer = wrapped_transfer(plan.filters, NEAR, *periods)
+    transfer = wrapped_transfer(plan.filters, NEAR, *periods, mesh.highest)
 
     def wrapped(y, x):
         phase_y, phase_x = (

@@ -12,6 +12,7 @@ from ..source_rates import sources_and_rates
 from ..sources import SourceArrays
 from .bounds import brightest_pixels, outside, psf_beyond, unseen
 from .direct import add_direct, has_sharp_edge
+from .fine_mesh import fine_meshes
 from .gaussians import NODES, Gaussians, decompose, join
 from .images import (
     highest_gaussian,
@@ -180,7 +181,7 @@ def _render(
         plan.digits + 1.0 + np.log(np.minimum(own_peak[smooth] / brightest, 1.0)),
         optics.moment(4 * NODES, np.inf if plan.near == "mesh" else BAND / plan.cell),
         share / np.sqrt(len(sources)),
-        plan.near_cell if plan.near == "mesh" else plan.cell,
+        fine_meshes(plan)[0].cell if plan.near == "mesh" else plan.cell,
     )
     if lattice is not None:
         gaussians = join([gaussians, lattice])

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from ..sources import SourceArrays
-from .plan import spread_cut
 from .profiles import disc_transform
+from .spreading import spread_cut
 
 Array = NDArray[np.float64]
 

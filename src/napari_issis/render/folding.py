@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Spectrum = NDArray[np.complex128]
+Spectrum = NDArray[np.complexfloating]
 
 
 def fold_rows(upper: Spectrum, lower: Spectrum, period: int) -> Spectrum:
@@ -23,7 +23,7 @@ def fold_rows(upper: Spectrum, lower: Spectrum, period: int) -> Spectrum:
     ndarray, shape (period, n)
         In the order of `scipy.fft.fft`.
     """
-    out = np.zeros((period, upper.shape[1]), dtype=np.complex128)
+    out = np.zeros((period, upper.shape[1]), dtype=upper.dtype)
     first = min(period, upper.shape[0])
     out[:first] = upper[:first]
     for start in range(period, upper.shape[0], period):
@@ -52,7 +52,7 @@ def fold_half(spectrum: Spectrum, period: int) -> Spectrum:
         As `scipy.fft.irfft` wants it.
     """
     modes, middle = spectrum.shape[1] - 1, period // 2
-    result = np.zeros((spectrum.shape[0], middle + 1), dtype=np.complex128)
+    result = np.zeros((spectrum.shape[0], middle + 1), dtype=spectrum.dtype)
     for first in range(0, modes + 1, period):
         part = spectrum[:, first : first + middle + 1]
         result[:, : part.shape[1]] += part

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -16,21 +14,17 @@ class Lookup:
 
     Parameters
     ----------
-    function : callable
-        Takes and returns an array.
+    values : ndarray, shape (n + 1,)
+        The function at equal distances from ``low`` to ``high``.
     low, high : float
         Range tabulated; arguments beyond it are moved to its ends.
-    intervals : int
-        Number of intervals.
     """
 
-    def __init__(
-        self, function: Callable[[Array], Array], low: float, high: float, intervals: int
-    ) -> None:
+    def __init__(self, values: Array, low: float, high: float) -> None:
         self.low, self.high = low, high
+        intervals = values.size - 1
         self.scale = intervals / (high - low)
-        knots = np.linspace(0.0, intervals, intervals + 1)
-        spline = CubicSpline(knots, function(low + knots / self.scale))
+        spline = CubicSpline(np.linspace(0.0, intervals, intervals + 1), values)
         self.coefficients = [np.ascontiguousarray(row) for row in spline.c]
 
     def __call__(self, x: Array) -> Array:

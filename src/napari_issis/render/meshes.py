@@ -17,8 +17,9 @@ from .interpolation import Span, add_up, spans
 from .near import near_rate
 from .optics import Transfer
 from .painting import half_patch, half_patches, paint
-from .plan import BAND, Plan, spread_cut
+from .plan import BAND, Plan
 from .rings import Band, band_transfer
+from .spreading import FEWEST_CUT_DIGITS, spread_cut
 from .threads import alongside
 
 # Uniform ellipses wider than this, in pixels, are painted on every mesh as far as they lie on it,
@@ -26,8 +27,6 @@ from .threads import alongside
 LARGEST_DISC = 400.0
 # share of the error allowed that each Gaussian may take where it is cut or sampled
 SHARE = 0.02
-# Gaussians are not cut where they are brighter than this, a natural logarithm
-FEWEST_CUT_DIGITS = 3.0
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]

@@ -1,4 +1,4 @@
-"""The frequencies above the coarse meshes' band, on one fine mesh that covers the frame.
+"""The frequencies above the coarse meshes' band, on fine meshes that cover the frame.
 
 What is too sharp for a mesh of whole pixels, points, cusps and edges, is painted on a mesh fine
 enough for every frequency that the PSF passes. Its transform is filtered and *folded* to the
@@ -17,25 +17,28 @@ from scipy import fft
 
 from ..sources import SourceArrays
 from .discs import disc_half_sizes, paint_discs, paint_large_discs
+from .fine_mesh import NEAR_UNIT, FineMesh, fine_meshes
 from .folding import fold_half, fold_rows
 from .gaussians import Gaussians
 from .optics import Transfer
 from .painting import half_patch, half_patches, paint
-from .plan import NEAR_UNIT, Plan, spread_cut
-from .rings import Band, band_transfer
+from .plan import Plan
+from .rings import Band, band_transfer, first_edge
+from .spreading import FEWEST_CUT_DIGITS, spread_cut
 from .threads import blocks, for_each
 from .wrapping import wrapped_transfer
 
 Array = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 
 # points of the mesh, some 5 GB of memory in all
 LARGEST_MESH = 5e8
 # the fine mesh's share of the frequencies
 NEAR = Band(-1, -1, 0)
 # rows and columns transformed at a time
-ROWS = 64
-COLUMNS = 48
+ROWS = 16
+COLUMNS = 16
+# Natural logarithm of the accuracy needed in a Gaussian's rings below which they are left out
+FEWEST_RING_DIGITS = 0.0
 
 
 @dataclass(frozen=True)
@@ -90,28 +93,58 @@ def near_rate(
     ValueError
         If the mesh would not fit into memory.
     """
-    cut = spread_cut(digits)
-    axes = _axes(plan, shape, gaussians, cut, discs, bool(len(large)))
-    y, x = axes
+    image: Array | None = None
+    for mesh in fine_meshes(plan):
+        painted, accuracy = gaussians, digits
+        if mesh.apart is not None:
+            accuracy = digits - (plan.digits - mesh.digits)
+            ringing = accuracy - _smoothing(plan, gaussians) > FEWEST_RING_DIGITS
+            painted, accuracy = gaussians.take(ringing), accuracy[ringing]
+        cut = spread_cut(np.maximum(accuracy, FEWEST_CUT_DIGITS))
+        part = _mesh_rate(mesh, shape, painted, cut, discs, disc_rate, large, large_rate)
+        image = part if image is None else image + part
+    assert image is not None
+    return image
+
+
+def _mesh_rate(
+    mesh: FineMesh,
+    shape: tuple[int, int],
+    gaussians: Gaussians,
+    cut: Array,
+    discs: SourceArrays,
+    disc_rate: Array,
+    large: SourceArrays,
+    large_rate: Array,
+) -> Array:
+    """One fine mesh's share of the count rate."""
+    y, x = _axes(mesh, shape, gaussians, cut, discs, bool(len(large)))
     if y.count * x.count > LARGEST_MESH:
         raise ValueError(
             f"this frame, PSF and accuracy need a mesh of {y.count} x {x.count} points, more than "
             "fits into memory; choose a smaller frame, a larger tolerance or a wider PSF."
         )
-    filtered = _filter(plan.filters, y.period, x.period)
+    filtered = _filter(mesh.filters, y.period, x.period)
     # room for the transform of each row in its own place
-    rows = np.zeros((y.painted, 2 * (x.count // 2 + 1)))
-    mesh = rows[:, : x.painted]
-    start, cell, spread = (float(y.start), float(x.start)), plan.near_cell, plan.near_spread()
-    paint(mesh, start, cell, gaussians, spread, cut)
-    paint_discs(mesh, start, cell, discs, disc_rate, spread, plan.digits)
+    rows = np.zeros((y.painted, 2 * (x.count // 2 + 1)), mesh.dtype)
+    points = rows[:, : x.painted]
+    start, cell, spread = (float(y.start), float(x.start)), mesh.cell, mesh.spread
+    paint(points, start, cell, gaussians, spread, cut)
+    paint_discs(points, start, cell, discs, disc_rate, spread, mesh.digits)
     if len(large):
-        paint_large_discs(mesh, start, cell, large, large_rate, spread, plan.digits)
+        paint_large_discs(points, start, cell, large, large_rate, spread, mesh.digits)
     return _at_pixels(rows, y, x, filtered, shape)
 
 
+def _smoothing(plan: Plan, gaussians: Gaussians) -> Array:
+    """Natural logarithm by which rings are weaker about each Gaussian than about a point."""
+    k = first_edge(plan.optics)
+    loss: Array = 2 * (np.pi * k * gaussians.minor) ** 2
+    return loss
+
+
 def _axes(
-    plan: Plan,
+    mesh: FineMesh,
     shape: tuple[int, int],
     gaussians: Gaussians,
     cut: Array,
@@ -119,54 +152,53 @@ def _axes(
     large: bool,
 ) -> tuple[Axis, Axis]:
     """Lay out a mesh that holds what is painted and where the kernel does not wrap around."""
-    cell, spread = plan.near_cell, plan.near_spread()
+    cell, spread = mesh.cell, mesh.spread
     disc_half = disc_half_sizes(discs)
     axes = []
     for axis in (0, 1):
         # at least so much, that scenes in the frame share their filters
-        edge = cell * (half_patch(spread**2, cell, plan.cut()) + 1.0)
-        edge += plan.reach(-1) if large else 0.0
+        edge = cell * (half_patch(spread**2, cell, mesh.cut) + 1.0)
+        edge += mesh.plan.reach(-1) if large else 0.0
         low, high = -edge, shape[axis] - 1 + edge
         variance = (gaussians.yy, gaussians.xx)[axis] + spread**2
         for centre, half in (
             ((gaussians.y, gaussians.x)[axis], cell * (half_patches(variance, cell, cut) + 1)),
-            ((discs.y, discs.x)[axis], disc_half[axis] * 1.1 + plan.cut() * spread + 12 * cell),
+            ((discs.y, discs.x)[axis], disc_half[axis] * 1.1 + mesh.cut * spread + 12 * cell),
         ):
             low = min(low, float((centre - half).min(initial=np.inf)))
             high = max(high, float((centre + half).max(initial=-np.inf)))
         start = int(np.floor(low))
-        need = plan.near_period(axis, shape[axis], start, high)
+        need = mesh.period(axis, shape[axis], start, high)
         period = NEAR_UNIT * fft.next_fast_len(int(np.ceil(need / NEAR_UNIT)), real=True)
         count = round(period / cell)
         # what covers everything must not end, not even out of reach
         painted = count if large else min(int((high - start) / cell) + 2, count)
-        axes.append(Axis(start, period, count, painted, int(plan.highest * period)))
+        axes.append(Axis(start, period, count, painted, int(mesh.highest * period)))
     return axes[0], axes[1]
 
 
 @lru_cache(maxsize=24)
-def _filter(plan: Plan, period_y: int, period_x: int) -> Transfer:
+def _filter(mesh: FineMesh, period_y: int, period_x: int) -> Transfer:
     """Filter of the mesh at the frequencies kept: ky and kx >= 0, or both signs of ky.
 
     It takes back the spreading and holds the area of a cell.
     """
-    cell, spread = plan.near_cell, plan.near_spread()
-    ky, kx = (np.arange(int(plan.highest * p) + 1) / p for p in (period_y, period_x))
+    plan, cell, spread = mesh.plan, mesh.cell, mesh.spread
+    ky, kx = (np.arange(int(mesh.highest * p) + 1) / p for p in (period_y, period_x))
     if not plan.optics.radial:
         ky = np.concatenate([ky, -ky[:0:-1]])
-    filtered: Transfer
-    if plan.wraps:
-        filtered = wrapped_transfer(plan, NEAR, period_y, period_x)
-    else:
-        filtered = np.empty((ky.size, kx.size), dtype=np.float64 if plan.optics.radial else complex)
+    wrapped = wrapped_transfer(plan, NEAR, period_y, period_x, mesh.highest) if plan.wraps else None
+    filtered: Transfer = np.empty((ky.size, kx.size), mesh.dtype if plan.optics.radial else complex)
     for block in blocks(ky.size, ROWS):  # temporary arrays stay small
-        if plan.wraps:
-            filtered[block] *= plan.optics.pixel(ky[block], kx)
-            filtered[block][np.hypot(ky[block, None], kx) > plan.highest] = 0.0
+        if wrapped is None:
+            part = high_pass(plan, ky[block], kx)
         else:
-            filtered[block] = high_pass(plan, ky[block], kx)
-        filtered[block] *= cell**2 * np.exp(2 * (np.pi * spread * ky[block]) ** 2)[:, None]
-        filtered[block] *= np.exp(2 * (np.pi * spread * kx) ** 2)
+            part = wrapped[block] * plan.optics.pixel(ky[block], kx)
+            part[np.hypot(ky[block, None], kx) > mesh.highest] = 0.0
+        if mesh.apart is not None:
+            part -= high_pass(mesh.apart, ky[block], kx)
+        part *= cell**2 * np.exp(2 * (np.pi * spread * ky[block]) ** 2)[:, None]
+        filtered[block] = part * np.exp(2 * (np.pi * spread * kx) ** 2)
     return filtered
 
 
@@ -182,17 +214,17 @@ def _at_pixels(rows: Array, y: Axis, x: Axis, filtered: Transfer, shape: tuple[i
     ``rows`` holds the mesh in its first columns and is overwritten. Along each axis only what
     is painted is transformed, and only what is wanted is kept.
     """
-    half = rows.view(np.complex128)
+    half = rows.view(np.result_type(rows, np.complex64))
 
     def transform_rows(block: slice) -> None:
         half[block] = fft.rfft(rows[block, : x.painted], x.count, axis=1)
 
     for_each(transform_rows, blocks(y.painted, ROWS))
     radial = filtered.shape[0] == y.modes + 1
-    in_y, in_x = (
-        (np.arange(n) - axis.start) % axis.period for n, axis in zip(shape, (y, x), strict=True)
-    )
-    inverted = np.empty((shape[0], x.modes + 1), dtype=np.complex128)
+    # a mesh starts before the frame and ends behind it
+    in_y, in_x = (slice(-axis.start, n - axis.start) for n, axis in zip(shape, (y, x), strict=True))
+    # in the place of columns that have been transformed
+    inverted = half[: shape[0], : x.modes + 1]
 
     def invert_columns(columns: slice) -> None:
         spectrum = fft.fft(half[:, columns], y.count, axis=0)

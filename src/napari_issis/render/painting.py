@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # mesh points painted at a time: what a core's cache holds
-BATCH = 16384
+BATCH = 32768
 # sides of the painted patches are rounded up to a multiple of this, so that many are alike
 STEP = 6
 

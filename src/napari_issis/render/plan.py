@@ -21,22 +21,17 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, special
+from scipy import special
 
+from .fine_mesh import fine_meshes
 from .optics import Optics
-from .rings import fading, first_edge, ring_fade, ring_reach, wrap_fade, wrap_fading
+from .rings import end_fade, fading, first_edge, ring_fade, ring_reach, wrap_fade, wrap_fading
+from .spreading import spread, spread_cut
 
 Array = NDArray[np.float64]
 
 # highest frequency used on a mesh, cycles per cell (0.5 would be its Nyquist frequency)
 BAND = 0.35
-# the same for the fine mesh, whose result is only wanted at the pixels
-NEAR_BAND = 0.42
-# Natural logarithm of the accuracy over the rounding errors of a transform, which the fine mesh
-# may reach: taking back the spreading amplifies them.
-ROUNDING = 44.0
-# the fine mesh's period is a multiple of this many pixels
-NEAR_UNIT = 8
 # rings are cut at multiples of this distance in pixels, so that filters are shared
 RING_STEP = 64.0
 
@@ -63,6 +58,8 @@ class Plan:
     ring_fade : float
         Argument of the error function with which the cut begins and ends: what it changes is
         exp(-ring_fade^2) of the rings there.
+    ring_width : float
+        Width of that error function, pixels.
     seen : (float, float)
         Largest distances in pixels, along y and x, between a pixel and a source.
     wrap_fade : float
@@ -77,6 +74,7 @@ class Plan:
     near: str
     ring_cut: float = np.inf
     ring_fade: float = 0.0
+    ring_width: float = 1.0
     seen: tuple[float, float] = (np.inf, np.inf)
     wrap_fade: float = 0.0
 
@@ -85,7 +83,7 @@ class Plan:
         """Frequency in cycles per pixel above which nothing passes."""
         highest = _highest(self.optics, self.digits)
         if self.ring_cut < np.inf:
-            cut = self.ring_fade / fading(self.optics)
+            cut = self.ring_fade / self.ring_width
             wrap = self.wrap_fade / wrap_fading(self.optics)
             highest += max(cut, wrap) / np.pi
         return highest
@@ -96,26 +94,16 @@ class Plan:
         return self.wrap_fade > 0
 
     @property
-    def near_cell(self) -> float:
-        """Cell of the fine mesh in pixels: a multiple of it is a pixel, and FFTs are quick."""
-        # at the highest frequency rounding grows by exp(digits band^2 / (1 - 2 band))
-        room = ROUNDING / self.digits - 1
-        band = min(NEAR_BAND, np.sqrt(room**2 + room) - room)
-        least = int(np.ceil(NEAR_UNIT * self.highest / band))
-        return NEAR_UNIT / int(fft.next_fast_len(least, real=True))
-
-    def near_spread(self) -> float:
-        """Width in pixels of the Gaussian with which points are spread on the fine mesh."""
-        return self.near_cell * _spread(self.digits, self.near_cell * self.highest)
-
-    def near_period(self, axis: int, pixels: int, low: float, high: float) -> float:
-        """Least period of the fine mesh along an axis of some pixels, painted from low to high."""
-        if self.wraps:
-            room = self._without_rings(-1)
-            least = 2 * (self.seen[axis] + self.wrap_fade * wrap_fading(self.optics))
-        else:
-            room, least = self.reach(-1), 0.0
-        return max(high - low, pixels - 1 + room - low, high + room, least) + 1
+    def compact(self) -> Plan:
+        """The plan with its rings cut at once, so that the fine mesh's kernel ends soon."""
+        return replace(
+            self,
+            ring_cut=0.0,
+            ring_fade=end_fade(self, -1, self.without_rings(-1)),
+            ring_width=wrap_fading(self.optics),
+            seen=(np.inf, np.inf),
+            wrap_fade=0.0,
+        )
 
     @property
     def filters(self) -> Plan:
@@ -144,7 +132,7 @@ class Plan:
 
     def spread(self) -> float:
         """Width in cells of the Gaussian with which points are spread on a coarse mesh."""
-        return _spread(self.digits, BAND)
+        return spread(self.digits, BAND)
 
     def cut(self) -> float:
         """`spread_cut` for the plan's accuracy."""
@@ -165,7 +153,7 @@ class Plan:
 
     def reach(self, level: int) -> float:
         """Distance in pixels to which a level's kernel is felt; level -1 is the fine mesh's."""
-        reach = self._without_rings(level)
+        reach = self.without_rings(level)
         if self.ring_digits > 0 and self._has_rings(level):
             reach = max(reach, min(_ring_reach(self, level), self.ring_end(level)))
         return reach
@@ -178,11 +166,11 @@ class Plan:
         """Distance in pixels at which the cut of a level's rings begins."""
         cell = self.cell_size(level) if level >= 0 else 0.0
         margin = 4 * self.taps() * cell if cell > 1 else 0.0
-        return max(self.ring_cut + margin, self._without_rings(level))
+        return max(self.ring_cut + margin, self.without_rings(level))
 
     def ring_end(self, level: int) -> float:
         """Distance in pixels at which a level's rings have been cut."""
-        return self.ring_begin(level) + 2 * self.ring_fade * fading(self.optics)
+        return self.ring_begin(level) + 2 * self.ring_fade * self.ring_width
 
     def ringing(self) -> list[int]:
         """Levels whose kernels have rings."""
@@ -193,7 +181,8 @@ class Plan:
         levels = {*self.ringing(), -1 if self.near else 0}
         return max(self.reach(j) for j in levels)
 
-    def _without_rings(self, level: int) -> float:
+    def without_rings(self, level: int) -> float:
+        """`reach` apart from rings."""
         # the filter's edge has the transform exp(-pi^2 width^2 r^2)
         reach = np.sqrt(self.digits) / (np.pi * self._width(level + 1))
         return float(reach) + self.optics.extent
@@ -206,7 +195,7 @@ class Plan:
 
 @lru_cache(maxsize=256)
 def _ring_reach(plan: Plan, level: int) -> float:
-    return ring_reach(plan, level, plan._without_rings(level))
+    return ring_reach(plan, level, plan.without_rings(level))
 
 
 def make_plan(
@@ -279,11 +268,11 @@ def _with_rings_cut(plan: Plan, farthest: float, *, always: bool = False) -> Pla
     """Cut the rings of a plan, by default only if they reach further than needed."""
     cut = RING_STEP * float(np.ceil(farthest / RING_STEP))
     levels = plan.ringing()
-    faded = all(_ring_reach(plan, j) <= max(cut, plan._without_rings(j)) for j in levels)
+    faded = all(_ring_reach(plan, j) <= max(cut, plan.without_rings(j)) for j in levels)
     if faded and not always:
         return plan
-    plan = replace(plan, ring_cut=cut)
-    fade = max(ring_fade(plan, j, plan._without_rings(j), plan.ring_begin(j)) for j in levels)
+    plan = replace(plan, ring_cut=cut, ring_width=fading(plan.optics))
+    fade = max(ring_fade(plan, j, plan.without_rings(j), plan.ring_begin(j)) for j in levels)
     return replace(plan, ring_fade=0.5 * float(np.ceil(2 * max(fade, 1.0))))
 
 
@@ -293,7 +282,7 @@ def _wrapped(plan: Plan, seen: tuple[float, float]) -> Plan:
     The rings are cut beyond these in any case, so that the kernel comes to an end.
     """
     plan = _with_rings_cut(replace(plan, ring_cut=np.inf), float(np.hypot(*seen)), always=True)
-    fade = wrap_fade(plan, -1, plan._without_rings(-1), min(seen))
+    fade = wrap_fade(plan, -1, plan.without_rings(-1), min(seen))
     return replace(plan, seen=seen, wrap_fade=0.25 * float(np.ceil(4 * max(fade, 1.0))))
 
 
@@ -302,28 +291,16 @@ def _highest(optics: Optics, digits: float) -> float:
     return max(optics.band_limit(0.1 * np.exp(-digits)), 1e-6)
 
 
-def spread_cut(digits: float | Array) -> Array:
-    """Distance in standard deviations at which a spread Gaussian may be cut.
-
-    Dividing by the spreading Gaussian's transform amplifies the cut.
-    """
-    return np.sqrt(2 * 1.25 * np.asarray(digits))
-
-
-def _spread(digits: float, band: float) -> float:
-    """Width in cells of a Gaussian with which points are spread.
-
-    Its aliases, exp(-2 pi^2 sigma^2 ((1 - band)^2 - band^2)), are below exp(-digits).
-    """
-    return float(np.sqrt(digits / (2 * np.pi**2 * (1 - 2 * band))))
-
-
 def _mesh_seconds(plan: Plan, shape: tuple[int, int], points: int) -> float:
-    """Rough run time of the fine mesh."""
-    cell, edge = plan.near_cell, plan.cut() * plan.near_spread()
-    periods = [plan.near_period(i, n, -edge, n - 1 + edge) for i, n in enumerate(shape)]
-    patch = (2 * edge / cell) ** 2
-    return 1.1e-8 * float(np.prod(periods)) / cell**2 + 3e-9 * points * patch
+    """Rough run time of the fine meshes."""
+    seconds = 0.0
+    for mesh in fine_meshes(plan):
+        edge = mesh.cut * mesh.spread
+        periods = [mesh.period(i, n, -edge, n - 1 + edge) for i, n in enumerate(shape)]
+        patch = (2 * edge / mesh.cell) ** 2
+        transform = 1.1e-8 if mesh.apart is None else 0.6e-8
+        seconds += transform * float(np.prod(periods)) / mesh.cell**2 + 3e-9 * points * patch
+    return seconds
 
 
 def _stamp_seconds(plan: Plan, points: int, extended: int) -> float:

@@ -172,7 +172,7 @@ def _log_transform(n: float) -> Lookup:
         log: Array = np.log(np.maximum(value, 1e-300))
         return log
 
-    return Lookup(logarithm, *LOG_Q_RANGE, 4000)
+    return Lookup(logarithm(np.linspace(*LOG_Q_RANGE, 4001)), *LOG_Q_RANGE)
 
 
 def disc_envelope(q: Array) -> Array:
@@ -207,7 +207,7 @@ def disc_transform(q: Array, accuracy: float = 1e-13) -> Array:
 
 @lru_cache(maxsize=16)
 def _disc_table(intervals: int) -> Lookup:
-    return Lookup(_disc_value, 0.0, LARGEST_Z, intervals)
+    return Lookup(_disc_value(np.linspace(0.0, LARGEST_Z, intervals + 1)), 0.0, LARGEST_Z)
 
 
 def _disc_value(z: Array) -> Array:

@@ -18,7 +18,9 @@ from scipy import fft, special
 
 from ..psf import RadialPSF
 from .hankel import hankel_nodes
+from .lookup import Lookup
 from .optics import Optics, Transfer
+from .threads import blocks
 
 if TYPE_CHECKING:
     from .plan import Plan
@@ -28,6 +30,8 @@ Array = NDArray[np.float64]
 # the cosine transform of a filter is tabulated over so many times the distance of the cut: what
 # rings beyond that leave behind is smaller than those at the cut by the 2.5th power of it
 TABLE = 256
+# one in so many of its values is kept
+KEPT = 8
 
 
 def first_edge(optics: Optics) -> float:
@@ -69,20 +73,17 @@ def band_transfer(plan: Plan, band: Band, ky: Array, kx: Array, limit: float) ->
 
 def cut_transfer(plan: Plan, band: Band, ky: Array, kx: Array, limit: float) -> Array:
     """`band_transfer` with the rings cut and without the pixel."""
-    psf = plan.optics.psf
-    assert isinstance(psf, RadialPSF)
     k = np.hypot(ky[:, None], kx)
     transfer = np.zeros_like(k)
-    passed = k <= limit
-    k = k[passed]
-    transfer[passed] = psf.otf(k / plan.optics.pixel_scale) * band.share(plan, k)
-    transfer[passed] += np.interp(k, *_change(plan, band))
+    table = cut_filter(plan, band)
+    passed = k <= min(limit, table.high)
+    transfer[passed] = table(k[passed])
     return transfer
 
 
 @lru_cache(maxsize=32)
-def _change(plan: Plan, band: Band) -> tuple[Array, Array]:
-    """Frequencies, and what cutting the rings adds there to a band's radial filter.
+def cut_filter(plan: Plan, band: Band) -> Lookup:
+    """Radial filter of a band, its rings cut, as a function of frequency.
 
     A radial kernel ends at a radius where its projection on a line ends (Abel's transform), and
     the filter is the cosine transform of that projection. The rings oscillate, so that a smooth
@@ -90,14 +91,21 @@ def _change(plan: Plan, band: Band) -> tuple[Array, Array]:
     """
     psf = plan.optics.psf
     assert isinstance(psf, RadialPSF)
-    end, width = plan.ring_end(band.level), fading(plan.optics)
+    end, width = plan.ring_end(band.level), plan.ring_width
     step = 0.5 / (TABLE * end)
-    k = step * np.arange(fft.next_fast_len(int(1.05 * plan.highest / step) + 2, real=True) + 1)
-    filtered = psf.otf(k / plan.optics.pixel_scale) * band.share(plan, k)
-    projection = fft.dct(filtered, type=1)
+    least = int(np.ceil(1.05 * plan.highest / (KEPT * step))) + 1
+    k = np.arange(KEPT * int(fft.next_fast_len(least, real=True)) + 1, dtype=np.float64)
+    k *= step
     x = np.arange(k.size) * 0.5 / k[-1]
-    window = 0.5 * special.erfc((x - end) / width + plan.ring_fade)
-    return k, fft.idct(projection * window, type=1) - filtered
+    filtered = np.empty_like(k)
+    for block in blocks(k.size, 2**14):  # temporary arrays stay small
+        filtered[block] = psf.otf(k[block] / plan.optics.pixel_scale)
+        filtered[block] *= band.share(plan, k[block])
+    projection = fft.dct(filtered, type=1, overwrite_x=True)
+    for block in blocks(k.size, 2**14):
+        projection[block] *= 0.5 * special.erfc((x[block] - end) / width + plan.ring_fade)
+    # a kernel that ends has a smooth filter
+    return Lookup(fft.idct(projection, type=1, overwrite_x=True)[::KEPT].copy(), 0.0, float(k[-1]))
 
 
 def fading(optics: Optics) -> float:
@@ -144,6 +152,20 @@ def wrap_fade(plan: Plan, level: int, start: float, begin: float) -> float:
     allowed = np.exp(-plan.ring_digits) / (2 * envelope)
     needed = special.erfcinv(np.minimum(allowed, 1.0))
     return float(np.max(needed - (begin - r) / wrap_fading(plan.optics)))
+
+
+def ring_height(plan: Plan, level: int, start: float) -> float:
+    """Natural logarithm of a kernel's rings at a distance, over a point source's peak."""
+    return float(np.log(_envelope(plan.filters, level, start)[1][0]))
+
+
+def end_fade(plan: Plan, level: int, start: float) -> float:
+    """Argument of the error function with which a kernel must have been cut.
+
+    What is left of the rings must be below the accuracy, with room for its transform's folds.
+    """
+    left = np.exp(-plan.ring_digits - ring_height(plan, level, start)) / 10
+    return 0.25 * float(np.ceil(4 * max(special.erfcinv(min(2 * left, 1.0)), 1.0)))
 
 
 def wrap_fading(optics: Optics) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from .plan import Plan
-from .rings import Band, cut_transfer, wrap_fading
+from .rings import Band, cut_filter, cut_transfer, wrap_fading
 from .threads import blocks, for_each
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ LINES = 32
 END = 5.0
 
 
-def wrapped_transfer(plan: Plan, band: Band, period_y: int, period_x: int) -> Array:
+def wrapped_transfer(plan: Plan, band: Band, period_y: int, period_x: int, limit: float) -> Array:
     """Transfer function of a band for a mesh around which the kernel wraps, without the pixel.
 
     Parameters
@@ -35,17 +35,20 @@ def wrapped_transfer(plan: Plan, band: Band, period_y: int, period_x: int) -> Ar
         Share of the frequencies.
     period_y, period_x : int
         Pixels.
+    limit : float
+        Highest frequency, cycles per pixel.
 
     Returns
     -------
     ndarray
-        At the multiples of 1 / period up to the plan's highest frequency.
+        At the multiples of 1 / period up to the limit.
     """
-    y, x = (_Line(plan, plan.ring_end(band.level), p) for p in (period_y, period_x))
+    y, x = (_Line(plan, plan.ring_end(band.level), p, limit) for p in (period_y, period_x))
+    cut_filter(plan, band)  # once, not in every thread
     between = np.empty((x.fine.size, y.count))
 
     def wrap_y(part: slice) -> None:
-        between[part] = y.wrap(cut_transfer(plan, band, x.fine[part], y.fine, plan.highest))
+        between[part] = y.wrap(cut_transfer(plan, band, x.fine[part], y.fine, limit))
 
     for_each(wrap_y, blocks(x.fine.size, LINES))
     result = np.empty((y.count, x.count))
@@ -64,9 +67,9 @@ class _Line:
     frequencies at which the latter is wanted, ``count`` the number of those that `wrap` returns.
     """
 
-    def __init__(self, plan: Plan, end: float, period: int) -> None:
+    def __init__(self, plan: Plan, end: float, period: int, limit: float) -> None:
         width = wrap_fading(plan.optics)
-        self.count = int(plan.highest * period) + 1
+        self.count = int(limit * period) + 1
         # the kernel is sampled at so many points in half a period
         self.half = int(fft.next_fast_len(self.count, real=True))
         ended = 0.5 * period + END * width
