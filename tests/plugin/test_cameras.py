@@ -53,8 +53,8 @@ def test_the_panel_offers_what_the_camera_has(scene, form):
     assert "1024 × 1024 (32.8″)" in labels
     assert "1700 Å" in form.channel.native.currentText()
     assert "FUV  1150–1700 Å" in form.channel.tooltip
-    assert "ACS/SBC" in form.psf.text()
-    assert "28 %" in form.psf.toolTip()
+    assert "ACS/SBC" in form.psf.text.text()
+    assert "28 %" in form.psf.text.toolTip()
     form.camera.value = ISSIS
     assert list(form.channel.choices) == ["FUV", "NUV"]
     assert "NF1" in form.wheel1.choices

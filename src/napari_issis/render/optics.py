@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 Transfer = NDArray[np.float64] | NDArray[np.complex128]
 
 
-# Cycles per pixel, those of a point of a hundredth of a pixel: finer meshes exceed the memory.
-HIGHEST = 100.0
+# Cycles per pixel, those of a Gaussian of FWHM 0.02 pixel: finer meshes exceed the memory.
+HIGHEST = 150.0
 
 
 @dataclass(frozen=True)
