@@ -175,6 +175,9 @@ def test_its_commands_make_the_same_counts(name, scene, tmp_path, capsys):
     exec(compile(page.code, "<sheet>", "exec"), made)
     pair = both_channels(SET_UPS[name])
     assert tuple(made["observations"]) == pair
+    for column in ("x", "y", "flux", "r_half", "ellipticity", "pa"):
+        given, again = (np.asarray(t[column], dtype=float) for t in (scene, made["sources"]))
+        assert again.tolist() == given.tolist()
     totals, printed = page.tables["Settings"][-1][1:], capsys.readouterr().out
     for one, exposure, total in zip(pair, made["exposures"], totals, strict=True):
         assert np.array_equal(exposure.counts, ni.simulate(scene, one, seed=11).counts)
