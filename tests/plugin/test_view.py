@@ -396,7 +396,7 @@ def test_a_paused_form_follows_nothing(scene, form):
 def test_a_layer_made_anew_has_its_keys(scene, form):
     """Catches keys that die with the first layer."""
     scene.viewer.layers.remove(scene.counts.layer)
-    scene.add(few_sources()[:1])
+    scene.restore()
     scene.wait()
     scene.viewer.scene.camera.zoom = 1.0
     bound = {str(key): call for key, call in scene.counts.layer.keymap.items()}

@@ -123,7 +123,7 @@ def test_closed_in_the_middle_of_a_render(make_napari_viewer, monkeypatch, qtbot
     # pytest-qt fails the test for an error in a slot
     QTest.qWait(100)
     # that of the autosave ends as well
-    jobs = [thread for thread in threading.enumerate() if "issis" in thread.name]
+    jobs = [thread for thread in threading.enumerate() if thread.name == "napari-issis job"]
     for job in jobs:
         job.join(60)
         assert not job.is_alive()

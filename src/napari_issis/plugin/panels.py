@@ -13,8 +13,10 @@ from .canvas_geometry import find_window
 
 LIST_NAME, ROW_NAME = "ISSIS sources", "ISSIS row trace"
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
-# Heights in pixels on the screen: so much that at 768 of them the canvas keeps the half.
-ROW_HEIGHT, LIST_HEIGHT = 120, 150
+# Heights in pixels on the screen: alone, and so much together that at 768 of them the canvas
+# keeps the half.
+ALONE = 150
+TOGETHER = {ROW_NAME: 120, LIST_NAME: 150}
 
 
 def toggle_panel(viewer: Any, name: str, make: Callable[[Any], QWidget], area: str) -> None:
@@ -46,7 +48,7 @@ def toggle_panel(viewer: Any, name: str, make: Callable[[Any], QWidget], area: s
         with suppress(RuntimeError):
             stack_at_bottom(window)
 
-    if window is not None:
+    if window is not None and name == LIST_NAME:
         # napari shows it a little later
         QTimer.singleShot(0, stack)
 
@@ -62,15 +64,13 @@ def stack_at_bottom(window: QMainWindow) -> None:
             here = window.dockWidgetArea(dock) == BOTTOM and not dock.isFloating()
             if here and not dock.isHidden() and dock.windowTitle().startswith(name):
                 found[name] = dock
-    heights = {ROW_NAME: ROW_HEIGHT, LIST_NAME: LIST_HEIGHT}
     if len(found) == 2 and not window.tabifiedDockWidgets(found[ROW_NAME]):
         # one that is being shown just now is not moved unless it is taken out first
         window.removeDockWidget(found[LIST_NAME])
         window.splitDockWidget(found[ROW_NAME], found[LIST_NAME], Qt.Orientation.Vertical)
         found[LIST_NAME].show()
-    window.resizeDocks(
-        list(found.values()), [heights[name] for name in found], Qt.Orientation.Vertical
-    )
+    heights = [TOGETHER[name] if len(found) == 2 else ALONE for name in found]
+    window.resizeDocks(list(found.values()), heights, Qt.Orientation.Vertical)
 
 
 def _dock_of(widget: QWidget) -> QWidget:
