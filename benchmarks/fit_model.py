@@ -77,7 +77,14 @@ class PixelModel:
         return value, -np.diff(density)
 
     def _galaxy(
-        self, x: float, y: float, r_half: float, ellipticity: float, pa: float, slopes: bool = True
+        self,
+        x: float,
+        y: float,
+        r_half: float,
+        ellipticity: float,
+        pa: float,
+        *,
+        slopes: bool = True,
     ) -> list[Array]:
         """Image of a galaxy of rate 1 and its derivatives by these parameters.
 
@@ -150,7 +157,8 @@ def fit(model: PixelModel, counts: Array, exposure: float, start: Array, scale: 
     def residual(scaled: Array) -> Array:
         m = mean(scaled)
         half = m + constant - counts * np.log(m)
-        return np.sign(m - counts) * np.sqrt(2 * np.maximum(half, 0.0))
+        signed: Array = np.sign(m - counts) * np.sqrt(2 * np.maximum(half, 0.0))
+        return signed
 
     def slope(scaled: Array) -> Array:
         m, r = mean(scaled), residual(scaled)

@@ -58,7 +58,7 @@ def main(scenes: list[str]) -> None:
         axes.append((y, x, rows.dtype))
         return keep(rows, y, x, *rest)
 
-    near._at_pixels = at_pixels
+    near._at_pixels = at_pixels  # type: ignore[assignment]
     print("| scene | tolerance | total ms |", " | ".join(STAGES), "| bare |")
     print("|---" * (len(STAGES) + 4) + "|")
     for scene in scenes:
@@ -98,12 +98,13 @@ def _bare(y: Axis, x: Axis, dtype: np.dtype[Any], shape: tuple[int, int]) -> flo
     folded = np.ones((LINES, y.period), column.dtype)
     row = np.ones((LINES, x.period // 2 + 1), column.dtype)
     seconds = 0.0
-    for lines, transform in (
+    transforms: tuple[tuple[int, Callable[[], Any]], ...] = (
         (y.painted, lambda: fft.rfft(real)),
         (x.modes + 1, lambda: fft.fft(column, overwrite_x=True)),
         (x.modes + 1, lambda: fft.ifft(folded, overwrite_x=True)),
         (shape[0], lambda: fft.irfft(row, x.period)),
-    ):
+    )
+    for lines, transform in transforms:
         times = []
         for _ in range(3):
             start = process_time()
