@@ -8,8 +8,8 @@ import napari_issis as ni
 from napari_issis.encircled_energy import encircled_energy, psf_table
 from napari_issis.psf import fwhm
 
-# An aperture so large that only the blurs are left.
-LARGE = 1e6
+# An aperture so large, in light so short, that only the blurs are left.
+LARGE = (1e4, 0.0, 10.0)
 
 
 def gaussian_share(diameter, width):
@@ -19,16 +19,16 @@ def gaussian_share(diameter, width):
 
 def test_blur_and_jitter_add_in_quadrature():
     """Catches widths that add linearly, and one blur in place of the other: 3, 4, 5."""
-    psf = ni.TelescopePSF(LARGE, blur_fwhm=0.06, jitter_fwhm=0.08)
+    psf = ni.TelescopePSF(*LARGE, blur_fwhm=0.06, jitter_fwhm=0.08)
     assert fwhm(psf) == pytest.approx(0.1, rel=1e-5)
-    swapped = ni.TelescopePSF(LARGE, blur_fwhm=0.08, jitter_fwhm=0.06)
+    swapped = ni.TelescopePSF(*LARGE, blur_fwhm=0.08, jitter_fwhm=0.06)
     assert fwhm(swapped) == pytest.approx(0.1, rel=1e-5)
 
 
 @pytest.mark.parametrize("diameter", [0.1, 0.5, 2.0])
 def test_encircled_energy_of_core_and_halo(diameter):
     """Catches a share that counts the core, and a halo not widened by the core's own blur."""
-    psf = ni.TelescopePSF(LARGE, blur_fwhm=0.1, halo_share=0.3, halo_fwhm=0.8)
+    psf = ni.TelescopePSF(*LARGE, blur_fwhm=0.1, halo_share=0.3, halo_fwhm=0.8)
     expected = 0.7 * gaussian_share(diameter, 0.1)
     expected += 0.3 * gaussian_share(diameter, np.hypot(0.1, 0.8))
     assert encircled_energy(psf, diameter) == pytest.approx(expected, rel=1e-6)

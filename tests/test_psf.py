@@ -132,7 +132,7 @@ def test_fwhm_of_known_profiles():
         (lambda: ni.GaussianPSF(np.nan), "fwhm is nan"),
         (lambda: ni.MoffatPSF(0.1, 1.0), "beta is 1"),
         (lambda: ni.TelescopePSF(-1), "diameter is -1"),
-        (lambda: ni.TelescopePSF(1e6), "diameter is 1e.06; apertures of at most 100 metres"),
+        (lambda: ni.TelescopePSF(1e6), "diameter is 1e.06; apertures of at most 10000 metres"),
         (lambda: ni.TelescopePSF(1.7, 1.0), "obscuration is 1"),
         (lambda: ni.TelescopePSF(1.7, 0.3, (3000, 2000)), "lower limit exceeds"),
         (lambda: ni.TelescopePSF(1.7, 0.3, np.inf), "band is inf"),

@@ -19,7 +19,7 @@ from .annulus import annular_otf, band_averaged_otf
 Array = NDArray[np.float64]
 
 ARCSEC_PER_RADIAN = 180 * 3600 / np.pi
-WIDEST = 100.0  # m
+WIDEST = 1e4  # m
 FWHM_PER_SIGMA = 2 * np.sqrt(2 * np.log(2))
 
 
@@ -172,7 +172,7 @@ class TelescopePSF(RadialPSF):
     Parameters
     ----------
     diameter : float
-        Aperture diameter, m, at most 100.
+        Aperture diameter, m, at most 10,000.
     obscuration : float
         Linear central obscuration, 0 to below 1.
     band : float or (float, float)

@@ -236,7 +236,10 @@ def test_tab_reaches_every_control(window, qtbot):
             child
             for form in forms
             for child in form.findChildren(QWidget)
-            if child.focusPolicy() == Qt.FocusPolicy.StrongFocus and child.isVisible()
+            if child.focusPolicy() == Qt.FocusPolicy.StrongFocus
+            and child.isVisible()
+            # the field of an editable list hands the focus to the list
+            and child.focusProxy() is None
         }
         rows = {child for child in list_of(window).findChildren(QAbstractButton) if child.text()}
         assert len(fields) > 9

@@ -87,7 +87,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         # beside the other numbers
         across.moveSection(PLACES["spectrum"], len(ALL_COLUMNS) - 1)
         self.count = QLabel()
-        self.forecast_box = QCheckBox("&Forecast")
+        self.forecast_box = QCheckBox("Forecast")
         self.forecast_box.setToolTip(
             "Show what can be measured of each source in the crowd, all fitted together"
         )

@@ -188,9 +188,10 @@ class Plan:
         return float(reach) + self.optics.extent
 
     def _has_rings(self, level: int) -> bool:
-        highest = BAND / self.cell_size(level) if level >= 0 else np.inf
-        edge = first_edge(self.optics)
-        return edge < np.inf and edge <= highest
+        # an edge that the blur has put out makes no rings
+        finest = _highest(self.optics, max(self.digits, self.ring_digits))
+        highest = BAND / self.cell_size(level) if level >= 0 else finest
+        return first_edge(self.optics) <= min(highest, finest)
 
 
 @lru_cache(maxsize=256)
