@@ -188,10 +188,13 @@ class Plan:
         return float(reach) + self.optics.extent
 
     def _has_rings(self, level: int) -> bool:
-        # an edge that the blur has put out makes no rings
-        finest = _highest(self.optics, max(self.digits, self.ring_digits))
-        highest = BAND / self.cell_size(level) if level >= 0 else finest
-        return first_edge(self.optics) <= min(highest, finest)
+        highest = BAND / self.cell_size(level) if level >= 0 else np.inf
+        edge = first_edge(self.optics)
+        if not edge < np.inf or edge > highest:
+            return False
+        # Where a blur has put the light out well below an edge, that makes no rings. (Without a
+        # blur the light fades towards the edge itself.)
+        return 0.7 * edge <= _highest(self.optics, max(self.digits, self.ring_digits))
 
 
 @lru_cache(maxsize=256)
