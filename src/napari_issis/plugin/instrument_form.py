@@ -84,13 +84,13 @@ class InstrumentForm(Form):
         self.add("Noise seed", self.seed, self.new_noise)
         self.add("Sky", self.sky_model)
         self.loss = CheckBox(
-            text="Coincidence loss",
-            tooltip="Photons lost in bright pixels to the dead time of the camera's detector "
-            "(ISSIS: assumed as in ACS/SBC, 1 % at 22 cps)",
+            text="Losses",
+            tooltip="Coincidence loss: photons lost in bright pixels to the dead time of the "
+            "camera's detector (ISSIS: assumed as in ACS/SBC, 1 % at 22 cps)",
         )
         self.rollover = CheckBox(
-            text="16-bit rollover",
-            tooltip="A pixel's memory has 16 bits: it holds the counts modulo 65536",
+            text="16 bits",
+            tooltip="Rollover: a pixel's memory has 16 bits: it holds the counts modulo 65536",
         )
         self.add("Detector", self.loss, self.rollover)
         self.sky = self.add_text("Background with the filters in place, by parts")

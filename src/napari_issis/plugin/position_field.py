@@ -31,6 +31,8 @@ class PositionField(LineEdit):
         self.value = (
             "" if position is None else position.icrs.to_string("hmsdms", sep=":", precision=3)
         )
+        # the field is narrow: its start tells more than its end
+        self.native.setCursorPosition(0)
 
     def _mark(self, event: Any = None) -> None:
         try:
