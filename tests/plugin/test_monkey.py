@@ -171,6 +171,9 @@ class Monkey:
             row, column = int(self.rng.integers(rows)), int(self.rng.integers(len(COLUMNS)))
             index = self.listed.model.index(row, column)
             texts = ["1e-15", "7.5", "0.3", "33", "-1", "nan", "abc", "20"]
+            if COLUMNS[column].name == "flux":
+                # 0.3 erg s-1 cm-2 A-1 is valid, and more light than counts can be drawn of
+                texts.remove("0.3")
             text = str(self.rng.choice([*KINDS, "comet"] if column == 0 else texts))
             if self.listed.model.flags(index) & self.listed.model.flags(index).ItemIsEditable:
                 self.listed.model.setData(index, text)
@@ -262,6 +265,7 @@ def test_whatever_the_monkey_does(viewer, mouse, qtbot, seed):
     qtbot.addWidget(listed)
     listed.show()
     scene.wait()
+    notification_manager.records.clear()
     monkey = Monkey(scene, mouse, listed, seed)
     start = scene.sources, scene.editor.source_id.copy()
     done = []
