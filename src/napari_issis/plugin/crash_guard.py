@@ -6,10 +6,11 @@ from typing import Any
 
 from napari.utils.notifications import show_error
 from qtpy.QtCore import QTimer
-from qtpy.QtWidgets import QApplication, QHBoxLayout, QLabel, QPushButton, QWidget
+from qtpy.QtWidgets import QApplication, QHBoxLayout, QLabel, QWidget
 
 from ..autosave import Autosave, CrashedScene, crashed_scenes
 from .latest_wins import LatestWins
+from .push_button import push_button
 from .scene import Scene
 
 # Milliseconds between an edit and its file.
@@ -30,17 +31,17 @@ class CrashGuard(QWidget):  # type: ignore[misc]
         self.scene = scene
         self.text = QLabel()
         self.text.setWordWrap(True)
-        self.restore = QPushButton("Restore")
-        self.restore.setToolTip("Add the sources of that scene, and set the instrument as it was")
-        self.forget = QPushButton("Forget")
-        self.forget.setToolTip("Delete that scene's file")
+        self.restore = push_button(
+            "Restore",
+            "Add the sources of that scene, and set the instrument as it was",
+            self._restore,
+        )
+        self.forget = push_button("Forget", "Delete that scene's file", self._forget)
         row = QHBoxLayout(self)
         row.setContentsMargins(4, 0, 4, 0)
         row.addWidget(self.text, 1)
         row.addWidget(self.restore)
         row.addWidget(self.forget)
-        self.restore.clicked.connect(self._restore)
-        self.forget.clicked.connect(self._forget)
         self._left: list[CrashedScene] = []
         self._file: Autosave | None = None
         self._saved = self._version

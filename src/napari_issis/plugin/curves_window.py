@@ -13,7 +13,6 @@ from qtpy.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QScrollArea,
     QVBoxLayout,
     QWidget,
@@ -21,6 +20,7 @@ from qtpy.QtWidgets import (
 
 from ..light_curve_plot import plot_light_curves
 from ..safe_write import replacing
+from .push_button import push_button
 
 # What may be saved: the numbers in the first two, the plot in the others.
 TABLES = {".ecsv": "ascii.ecsv", ".csv": "ascii.csv"}
@@ -53,9 +53,11 @@ class CurvesWindow(QDialog):  # type: ignore[misc]
         self.plot.setToolTip("Points: fitted fluxes with forecast errors. Lines: as planned")
         scroll = QScrollArea()
         scroll.setWidget(self.plot)
-        save = QPushButton("&Save…")
-        save.setToolTip(f"Save the numbers (.ecsv, .csv) or the plot ({', '.join(PLOTS)})")
-        save.clicked.connect(lambda _=False: self.ask())
+        save = push_button(
+            "&Save…",
+            f"Save the numbers (.ecsv, .csv) or the plot ({', '.join(PLOTS)})",
+            self.ask,
+        )
         line = QHBoxLayout()
         line.addStretch(1)
         line.addWidget(save)

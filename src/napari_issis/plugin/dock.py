@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from magicgui.widgets import PushButton
@@ -29,6 +28,7 @@ from .missing_layers import MissingLayers
 from .panels import LIST_NAME, toggle_panel
 from .png_menu import PngMenu
 from .progress_row import ProgressRow
+from .push_button import push_button
 from .scene import open_scene
 from .sheet_dialog import SheetDialog
 from .source_form import SourceForm
@@ -70,21 +70,23 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
             text="Sav&e FITS…", tooltip="Save the exposure as a FITS file: whole, or one image"
         )
         self.save.changed.connect(self.save_fits)
-        self.sheet = _tool("Sheet…", self.ask_sheet)
-        self.sheet.setToolTip("Write a proposal sheet: both channels, forecasts, commands")
+        self.sheet = push_button(
+            "Sheet…",
+            "Write a proposal sheet: both channels, forecasts, commands",
+            self.ask_sheet,
+        )
         self._sheet_dialog: SheetDialog | None = None
         self.form = next(iter(FITS_FORMS))
         tools = QHBoxLayout()
         tools.setContentsMargins(4, 0, 4, 0)
-        self.undo = _tool("&Undo", self.scene.undo)
-        self.redo = _tool("&Redo", self.scene.redo)
-        self.list = _tool("S&ources", self.toggle_list)
-        self.list.setToolTip("Show or hide the list of sources")
+        # what they would do is told by `show_steps`
+        self.undo = push_button("&Undo", "", self.scene.undo)
+        self.redo = push_button("&Redo", "", self.scene.redo)
+        self.list = push_button("S&ources", "Show or hide the list of sources", self.toggle_list)
         self.png = QPushButton("PNG")
         self.png.setToolTip("Save the final image, the source model or RGBA data as a picture")
         self.png.setMenu(PngMenu(self.scene, self))
-        self.keys = _tool("Ke&ys", lambda: show_keys(self))
-        self.keys.setToolTip("List the keys")
+        self.keys = push_button("Ke&ys", "List the keys", lambda: show_keys(self))
         for button in (self.undo, self.redo, self.list, self.png, self.keys):
             button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
             tools.addWidget(button, 3 if button is self.list else 2)
@@ -210,13 +212,6 @@ def _page(*forms: QWidget) -> QScrollArea:
     scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     scroll.setWidget(page)
     return scroll
-
-
-def _tool(label: str, action: Callable[[], None]) -> QPushButton:
-    button = QPushButton(label)
-    # without the flag that Qt hands over
-    button.clicked.connect(lambda _=False: action())
-    return button
 
 
 def dock_simulator(viewer: Any) -> None:

@@ -13,7 +13,6 @@ from qtpy.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -26,6 +25,7 @@ from ..observation import Observation
 from .goal_plot import GoalCurve, GoalPlot
 from .instrument_form import WARNING_STYLE
 from .number_field import NumberField
+from .push_button import push_button
 from .scene import open_scene
 from .scene_forecast import SceneForecast
 
@@ -69,9 +69,11 @@ class GoalPanel(QWidget):  # type: ignore[misc]
         self.warning = QLabel()
         self.warning.setWordWrap(True)
         self.warning.setStyleSheet(WARNING_STYLE)
-        self.button = QPushButton("&Use this exposure")
-        self.button.setToolTip("Set the scene's exposure time to the one that reaches the goal")
-        self.button.clicked.connect(self.use)
+        self.button = push_button(
+            "&Use this exposure",
+            "Set the scene's exposure time to the one that reaches the goal",
+            self.use,
+        )
         line = QHBoxLayout()
         line.addWidget(self.kind, 2)
         line.addWidget(self.target.native, 1)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from napari.utils.notifications import show_error
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QWidget
 
+from .push_button import push_button
 from .scene import Scene
 
 NAMES = {"counts": "the final image", "ellipses": "extended sources", "points": "point sources"}
@@ -26,11 +27,10 @@ class MissingLayers(QWidget):  # type: ignore[misc]
         self.scene = scene
         self.text = QLabel()
         self.text.setWordWrap(True)
-        self.button = QPushButton("Restore")
-        self.button.clicked.connect(self._restore)
-        self.leave = QPushButton("Leave")
-        self.leave.setToolTip("Do without: a layer of sources comes back with its next source")
-        self.leave.clicked.connect(self._leave)
+        self.button = push_button("Restore", "", self._restore)
+        self.leave = push_button(
+            "Leave", "Do without: a layer of sources comes back with its next source", self._leave
+        )
         row = QHBoxLayout(self)
         row.setContentsMargins(8, 0, 4, 0)
         row.addWidget(self.text, 1)
@@ -62,12 +62,12 @@ class MissingLayers(QWidget):  # type: ignore[misc]
         )
         self.setVisible(set(missing) > set(self._left))
 
-    def _restore(self, checked: bool = False) -> None:
+    def _restore(self) -> None:
         try:
             self.scene.restore()
         except ValueError as error:
             show_error(str(error))
 
-    def _leave(self, checked: bool = False) -> None:
+    def _leave(self) -> None:
         self._left = self.scene.missing
         self.show_missing()

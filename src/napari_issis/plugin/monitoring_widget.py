@@ -14,7 +14,6 @@ from qtpy.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QProgressBar,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -26,6 +25,7 @@ from .curves_window import CurvesWindow
 from .latest_wins import LatestWins
 from .monitoring_form import MonitoringForm
 from .monitoring_layer import show_monitoring
+from .push_button import push_button
 from .scene import open_scene
 from .writer import fits_path
 
@@ -60,9 +60,9 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
         self.scene = open_scene(viewer=napari_viewer, dock=False)
         self.form = MonitoringForm()
         self.buttons = [
-            _button("S&how stack", "Add the epochs as a layer with a slider", self.show_stack),
-            _button("Save &cube…", "Save one co-added frame an epoch as FITS", self.save_cube),
-            _button(
+            push_button("S&how stack", "Add the epochs as a layer with a slider", self.show_stack),
+            push_button("Save &cube…", "Save one co-added frame an epoch as FITS", self.save_cube),
+            push_button(
                 "&Light curves",
                 "Simulate all exposures, fit all fluxes at each epoch, and plot them",
                 self.recover,
@@ -70,7 +70,7 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
         ]
         self.bar = QProgressBar()
         self.bar.setToolTip("How far the job is")
-        self.cancel = _button("Cancel", "Stop; nothing is shown or saved", self.stop)
+        self.cancel = push_button("Cancel", "Stop; nothing is shown or saved", self.stop)
         self.curves: CurvesWindow | None = None
         self._jobs = LatestWins(self._done, self._failed)
         self._wanted = 0
@@ -189,11 +189,3 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
             return
         self._idle()
         show_error(str(error))
-
-
-def _button(label: str, tooltip: str, action: Callable[[], None]) -> QPushButton:
-    button = QPushButton(label)
-    button.setToolTip(tooltip)
-    # without the flag that Qt hands over
-    button.clicked.connect(lambda _=False: action())
-    return button

@@ -17,7 +17,6 @@ from qtpy.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QTableWidget,
     QTableWidgetItem,
     QVBoxLayout,
@@ -29,6 +28,7 @@ from ..exposure import Exposure, simulate
 from ..limits import CountRateWarning
 from ..result_table import SUFFIXES, write_table
 from .background_job import BackgroundJob
+from .push_button import push_button
 from .scene import Scene
 
 # Columns that are shown: name, heading, format.
@@ -80,13 +80,13 @@ class PhotometryDialog(QDialog):  # type: ignore[misc]
         )
         self.inner = _number(2.0, 1.0, 20.0, "Inner edge of the annulus over the aperture's")
         self.outer = _number(3.0, 1.1, 30.0, "Outer edge of the annulus over the aperture's")
-        self.measure_button = QPushButton("&Measure")
-        self.measure_button.setToolTip("Measure the selected sources; all if none is selected")
-        self.measure_button.clicked.connect(lambda _=False: self.measure())
-        self.save_button = QPushButton("&Save…")
-        self.save_button.setToolTip("Write the whole table to a file: ECSV or CSV")
+        self.measure_button = push_button(
+            "&Measure", "Measure the selected sources; all if none is selected", self.measure
+        )
+        self.save_button = push_button(
+            "&Save…", "Write the whole table to a file: ECSV or CSV", self.save
+        )
         self.save_button.setEnabled(False)
-        self.save_button.clicked.connect(lambda _=False: self.save())
         self.text = QLabel()
         options = QHBoxLayout()
         for label, widget in (

@@ -21,7 +21,6 @@ from qtpy.QtWidgets import (
     QHBoxLayout,
     QHeaderView,
     QLabel,
-    QPushButton,
     QTableView,
     QToolTip,
     QVBoxLayout,
@@ -33,6 +32,7 @@ from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
 from .cell_editors import CellEditors
 from .list_forecast import ListForecast, with_forecast
 from .photometry_dialog import PhotometryDialog
+from .push_button import push_button
 from .reader import tell_notes
 from .scene import open_scene
 from .source_columns import COLUMNS, from_text, to_text
@@ -107,10 +107,7 @@ class SourceList(QWidget):  # type: ignore[misc]
             ("Expor&t…", "Write the sources to a file: ECSV, CSV, FITS, VOTable", self.save),
             ("Photometry…", "Measure sources in apertures, beside the truth", self.photometry),
         ):
-            button = QPushButton(label)
-            button.setToolTip(tooltip)
-            button.clicked.connect(lambda _=False, action=action: action())
-            row.addWidget(button)
+            row.addWidget(push_button(label, tooltip, action))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(4, 2, 4, 4)
         layout.addWidget(self.view)
