@@ -6,7 +6,7 @@ from astropy.table import vstack
 
 import napari_issis as ni
 from napari_issis.bright_sources import bright_sources
-from napari_issis.limits import brief_warning, count_rate_warnings
+from napari_issis.limits import count_rate_warnings, long_and_brief
 
 SHAPE = (80, 90)
 # FWHM of 3 pixels: 9 % of a star's light falls into its central pixel.
@@ -95,7 +95,7 @@ def test_the_cure_leaves_curves_in_their_wheels(filters, peak, cure):
 
 def brief(table, observation=OBSERVATION):
     rate = ni.count_rate(table, observation)
-    return brief_warning(rate, observation.background_rate, table, observation)
+    return long_and_brief(rate, observation.background_rate, table, observation)[1]
 
 
 def test_in_a_line_or_two():

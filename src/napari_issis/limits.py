@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from math import inf, prod
 from typing import Any
@@ -52,59 +53,94 @@ def count_rate_warnings(
     The limits are the channel's. Those of ISSIS are of HST ACS/SBC, the nearest analogue: none
     has been published. The frame stands for the detector; light outside it is not seen.
     """
-    if rate.size == 0:
-        return []
+    named = None if observation is None else sources
     own = Observation() if observation is None else observation
-    detector = own.instrument.limits_note or f"the detector of {own.instrument.name}"
-    local_limit, total_limit = _limits(own)
-    messages = []
-    total = float(rate.sum() + background_rate * rate.size)
-    if total > total_limit:
-        messages.append(
-            f"The frame receives {total:.3g} cps; {detector} is linear up to {total_limit:.0e} cps."
-        )
-    local = rate + background_rate
-    peak = float(local.max())
-    if peak > local_limit:
-        y, x = np.unravel_index(int(local.argmax()), local.shape)
-        count = int(np.count_nonzero(local > local_limit))
-        pixels = "1 pixel receives" if count == 1 else f"{count} pixels receive"
-        messages.append(
-            f"{pixels} more than {local_limit:g} cps, at most {peak:.3g} cps at x = {x}, "
-            f"y = {y}; {detector} counts linearly below that."
-        )
-        if sources is not None and observation is not None:
-            messages[-1] += _names(sources, bright_sources(sources, observation, rate))
-    if messages:
-        excess = max(total / total_limit, peak / local_limit)
-        messages[-1] += f" {_cure(excess, own.filters, own.instrument)}"
-    return messages
+    breach = _breach(rate, background_rate, named, own)
+    return [] if breach is None else breach.at_length()
 
 
-def brief_warning(
+def long_and_brief(
     rate: NDArray[np.float64], background_rate: float, sources: Table, observation: Observation
-) -> str:
-    """Say in a line or two what `count_rate_warnings` says; empty if no limit is broken.
+) -> tuple[list[str], str]:
+    """Return what `count_rate_warnings` says, and the same in a line or two, empty if nothing.
 
-    It names the source with the brightest pixel, or the rate in all where no pixel is too
-    bright, and the cure. Parameters as there.
+    The latter names the source with the brightest pixel, or the rate in all where no pixel is
+    too bright, and the cure. Parameters as there.
     """
+    breach = _breach(rate, background_rate, sources, observation)
+    return ([], "") if breach is None else (breach.at_length(), breach.briefly())
+
+
+@dataclass(frozen=True)
+class _Breach:
+    """How far a scene is above the limits; ``sources`` None where they are not to be named."""
+
+    local: NDArray[np.float64]
+    total: float
+    peak: float
+    limits: tuple[float, float]
+    sources: Table | None
+    rows: NDArray[np.int64]
+    observation: Observation
+
+    def at_length(self) -> list[str]:
+        camera = self.observation.instrument
+        detector = camera.limits_note or f"the detector of {camera.name}"
+        local_limit, total_limit = self.limits
+        messages = []
+        if self.total > total_limit:
+            messages.append(
+                f"The frame receives {self.total:.3g} cps; {detector} is linear up to "
+                f"{total_limit:.0e} cps."
+            )
+        if self.peak > local_limit:
+            y, x = np.unravel_index(int(self.local.argmax()), self.local.shape)
+            count = int(np.count_nonzero(self.local > local_limit))
+            pixels = "1 pixel receives" if count == 1 else f"{count} pixels receive"
+            messages.append(
+                f"{pixels} more than {local_limit:g} cps, at most {self.peak:.3g} cps at x = {x}, "
+                f"y = {y}; {detector} counts linearly below that."
+            )
+            if self.sources is not None:
+                messages[-1] += _names(self.sources, self.rows)
+        messages[-1] += f" {self._cure()}"
+        return messages
+
+    def briefly(self) -> str:
+        local_limit, total_limit = self.limits
+        if self.peak > local_limit:
+            rows = self.rows
+            there = f", row {rows[0]}" if rows.size else ""
+            more = f" and {rows.size - 1} more" if rows.size > 1 else ""
+            text = f"Too bright: {self.peak:.3g} cps/px (limit {local_limit:g}){there}{more}."
+        else:
+            text = f"Too bright: {self.total:.3g} cps in all (limit {total_limit:.0e})."
+        return f"{text} {self._cure().removeprefix('The neutral filter ')}"
+
+    def _cure(self) -> str:
+        local_limit, total_limit = self.limits
+        excess = max(self.total / total_limit, self.peak / local_limit)
+        return _cure(excess, self.observation.filters, self.observation.instrument)
+
+
+def _breach(
+    rate: NDArray[np.float64],
+    background_rate: float,
+    sources: Table | None,
+    observation: Observation,
+) -> _Breach | None:
     if rate.size == 0:
-        return ""
-    local_limit, total_limit = _limits(observation)
-    total = float(rate.sum() + background_rate * rate.size)
-    peak = float(rate.max()) + background_rate
-    if total <= total_limit and peak <= local_limit:
-        return ""
-    text = f"Too bright: {total:.3g} cps in all (limit {total_limit:.0e})."
-    if peak > local_limit:
+        return None
+    channel = observation.channel_data
+    limits = channel.local_limit or inf, channel.total_limit or inf
+    local = rate + background_rate
+    total, peak = float(rate.sum() + background_rate * rate.size), float(local.max())
+    if peak <= limits[0] and total <= limits[1]:
+        return None
+    rows = np.empty(0, dtype=np.int64)
+    if sources is not None and peak > limits[0]:
         rows = bright_sources(sources, observation, rate)
-        there = f", row {rows[0]}" if rows.size else ""
-        more = f" and {rows.size - 1} more" if rows.size > 1 else ""
-        text = f"Too bright: {peak:.3g} cps/px (limit {local_limit:g}){there}{more}."
-    excess = max(total / total_limit, peak / local_limit)
-    cure = _cure(excess, observation.filters, observation.instrument)
-    return f"{text} {cure.removeprefix('The neutral filter ')}"
+    return _Breach(local, total, peak, limits, sources, rows, observation)
 
 
 def warn_of_count_rates(
@@ -118,12 +154,6 @@ def warn_of_count_rates(
         rate, observation.background_rate, sources=sources, observation=observation
     ):
         warnings.warn(message, CountRateWarning, stacklevel=stacklevel + 1)
-
-
-def _limits(observation: Observation) -> tuple[float, float]:
-    """Count rates per pixel and in all above which the channel's detector is not linear, cps."""
-    channel = observation.channel_data
-    return channel.local_limit or inf, channel.total_limit or inf
 
 
 def _names(sources: Table, rows: NDArray[np.int64]) -> str:

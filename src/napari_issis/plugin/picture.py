@@ -20,7 +20,7 @@ from ..exposure import (
     noise_ready_rate,
     same_table,
 )
-from ..limits import brief_warning, count_rate_warnings
+from ..limits import long_and_brief
 from ..observation import Observation
 
 Array = NDArray[np.float64]
@@ -70,12 +70,9 @@ class PictureMaker:
     def final(self, sources: QTable, observation: Observation, seed: int) -> Picture:
         """Make the exposure that `napari_issis.simulate` makes of the same scene."""
         rate, clipped = self._rate(sources, observation)
-        sky = observation.background_rate
-        return Picture(
-            expose(rate, sources, observation, seed=seed, clipped=clipped),
-            tuple(count_rate_warnings(rate, sky, sources=sources, observation=observation)),
-            brief_warning(rate, sky, sources, observation),
-        )
+        at_length, brief = long_and_brief(rate, observation.background_rate, sources, observation)
+        exposure = expose(rate, sources, observation, seed=seed, clipped=clipped)
+        return Picture(exposure, tuple(at_length), brief)
 
     def preview(
         self,
