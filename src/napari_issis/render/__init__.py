@@ -152,12 +152,14 @@ def _render(
     clear = np.maximum(np.hypot(*beyond) - edge, 0.0)
     ringing = ~unseen(strength * psf_beyond(optics, clear), 0.05 * allowed)
 
+    half = np.where(is_point, 0.0, np.sqrt(2) * np.minimum(sources.r_half, LARGEST_DISC))
+
     def distances(reach: float) -> tuple[float, tuple[float, float]]:
         near = ~imaged & (~is_point | (np.maximum(*beyond) <= reach))
-        rings = _distances(sources.take(near & ringing), shape)
-        seen = _distances(sources.take(near), shape)
+        rings = _distances(sources.take(near & ringing), shape, half[near & ringing])
+        seen = _distances(sources.take(near), shape, half[near])
         if lattice is not None:
-            far = _lattice_distances(lattice, shape)
+            far = _distances(lattice, shape)
             rings = max(far[0], rings[0]), max(far[1], rings[1])
             seen = max(far[0], seen[0]), max(far[1], seen[1])
         return float(np.hypot(*rings)), seen
@@ -226,22 +228,15 @@ def _ring_accuracy(optics: Optics, sources: SourceArrays, strength: Array, allow
     return float(allowed * optics.point_area / (strongest * 3 * (1 + np.sqrt(neighbours))))
 
 
-def _distances(sources: SourceArrays, shape: tuple[int, int]) -> tuple[float, float]:
-    """Largest distances (y, x) in pixels between a source and a pixel."""
-    half = np.sqrt(2) * np.minimum(sources.r_half, LARGEST_DISC)
-    half[sources.kind == "point"] = 0.0
-    distances = []
-    for p, n in zip((sources.y, sources.x), shape, strict=True):
-        distances.append(float((np.maximum(p, n - 1 - p) + half).max(initial=0.0)))
-    return distances[0], distances[1]
-
-
-def _lattice_distances(lattice: Gaussians, shape: tuple[int, int]) -> tuple[float, float]:
-    """Largest distances (y, x) in pixels between a Gaussian of an image and a pixel."""
-    distances = []
-    for p, n in zip((lattice.y, lattice.x), shape, strict=True):
-        distances.append(float(np.maximum(p, n - 1 - p).max(initial=0.0)))
-    return distances[0], distances[1]
+def _distances(
+    lights: SourceArrays | Gaussians, shape: tuple[int, int], half: Array | float = 0.0
+) -> tuple[float, float]:
+    """Largest distances (y, x) in pixels between a pixel and the far side of a light."""
+    y, x = (
+        float((np.maximum(p, n - 1 - p) + half).max(initial=0.0))
+        for p, n in zip((lights.y, lights.x), shape, strict=True)
+    )
+    return y, x
 
 
 def peaks(optics: Optics, sources: SourceArrays, rate: Array) -> Array:
