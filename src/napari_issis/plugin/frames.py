@@ -64,9 +64,12 @@ class Frames:
         wanted = np.arange(len(self))[first]
         if wanted.ndim == 0:
             frame: NDArray[Any] = self._frame(int(wanted))[tuple(rest)]
+            self._prepare_after(int(wanted))
             return frame
         # Of more than may be kept, the first: the others would drive each other out for ever.
         seen = [self._frame(int(index)) for index in wanted[: self._most]]
+        if len(wanted) == 1:
+            self._prepare_after(int(wanted[0]))
         frames = np.stack(seen + [self._blank] * (len(wanted) - len(seen)))
         return frames[(slice(None), *rest)]
 
@@ -86,10 +89,18 @@ class Frames:
             self._kept[index] = self._kept.pop(index)
             return self._kept[index]
         self._missed.add(index)
-        last = min(index + 1 + AHEAD, len(self))
-        self._ahead = [k for k in range(index + 1, last) if k not in self._kept]
         self._request(index)
         return self._blank
+
+    def _prepare_after(self, index: int) -> None:
+        self._ahead = list(range(index + 1, min(index + 1 + AHEAD, len(self))))
+        self._follow()
+
+    def _follow(self) -> None:
+        while self._ahead and not self._jobs.busy:
+            following = self._ahead.pop(0)
+            if following not in self._kept:
+                self._request(following)
 
     def _request(self, index: int) -> None:
         self._jobs.request(partial(self._compute, index))
@@ -108,10 +119,7 @@ class Frames:
             # the others were passed by, and are asked for again where they are seen
             self._missed.clear()
             self._arrived(frame)
-        while self._ahead and not self._jobs.busy:
-            following = self._ahead.pop(0)
-            if following not in self._kept:
-                self._request(following)
+        self._follow()
 
     def _failed(self, error: BaseException) -> None:
         self._ahead.clear()
