@@ -45,7 +45,7 @@ def test_the_work_that_is_watched_is_done_where_it_is_needed(monkeypatch):
         function.__name__: watch(monkeypatch, function)
         for function in (
             render._render,
-            near.near_rate,
+            near.paint_near,
             stamps.add_stamps,
             stamps.transform,
             painting.paint,
@@ -150,7 +150,7 @@ def test_points_make_no_profiles_and_no_discs(psf, number, monkeypatch):
 @each_psf
 def test_sharp_light_is_carried_once(psf, monkeypatch):
     """One star has a stamp and makes no fine mesh, many have a fine mesh and no stamps."""
-    meshes = watch(monkeypatch, near.near_rate)
+    meshes = watch(monkeypatch, near.paint_near)
     stamped = watch(monkeypatch, stamps.add_stamps)
     ni.count_rate(scene("point", 1), observed(psf))
     assert (len(meshes), len(stamped)) == (0, 1)
@@ -161,7 +161,7 @@ def test_sharp_light_is_carried_once(psf, monkeypatch):
 @one_and_many
 @each_psf
 def test_smooth_sources_make_no_fine_mesh_and_no_stamps(psf, number, monkeypatch):
-    meshes = watch(monkeypatch, near.near_rate)
+    meshes = watch(monkeypatch, near.paint_near)
     stamped = [watch(monkeypatch, f) for f in (stamps.transform, stamps.high_pass)]
     ni.count_rate(scene("gaussian", number, r_half=20.0, ellipticity=0.3), observed(psf))
     assert meshes == []
@@ -186,7 +186,7 @@ def test_stars_out_of_reach_are_not_on_the_fine_mesh(psf, monkeypatch):
     """They are painted on a coarse mesh; the fine one is as small as without them."""
     stars, far = scene("point", 200), scene("point", 40)
     far["x"] += 3000.0
-    meshes = watch(monkeypatch, near.near_rate)
+    meshes = watch(monkeypatch, near.paint_near)
     ni.count_rate(stars, observed(psf))
     ni.count_rate(vstack([stars, far]), observed(psf))
     alone, beside_others = (args[2] for args in meshes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from ..sources import SourceArrays
 from .discs import disc_half_sizes, paint_discs, paint_large_discs
 from .gaussians import Gaussians
 from .interpolation import Span, add_up, spans
-from .near import near_rate
+from .near import paint_near
 from .optics import Transfer
 from .painting import half_patch, half_patches, paint
 from .plan import BAND, Plan
@@ -122,7 +122,7 @@ def mesh_rate(
     close = _outside(shape, discs.y, discs.x, disc_half_sizes(discs)) <= plan.reach(-1)
     if plan.near == "mesh" and (near.any() or close.any() or len(large)):
         sharp = (gaussians.take(near), digits[near], discs.take(close), disc_rate[close])
-        near_image = alongside(partial(near_rate, plan, shape, *sharp, large, large_rate))
+        near_image = alongside(paint_near(plan, shape, *sharp, large, large_rate))
     results: list[Array | None] = []
     passed: Density | None = None
     for level, frame in enumerate(spans(plan, shape, top + 1)):

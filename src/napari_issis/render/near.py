@@ -8,6 +8,7 @@ inverted at that rate only.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -25,7 +26,7 @@ from .painting import half_patch, half_patches, paint
 from .plan import Plan
 from .rings import Band, band_transfer, first_edge
 from .spreading import FEWEST_CUT_DIGITS, spread_cut
-from .threads import blocks, for_each
+from .threads import for_each, pieces
 from .wrapping import wrapped_transfer
 
 Array = NDArray[np.float64]
@@ -34,9 +35,6 @@ Array = NDArray[np.float64]
 LARGEST_MESH = 5e8
 # the fine mesh's share of the frequencies
 NEAR = Band(-1, -1, 0)
-# rows and columns transformed at a time
-ROWS = 16
-COLUMNS = 16
 # Natural logarithm of the accuracy needed in a Gaussian's rings below which they are left out
 FEWEST_RING_DIGITS = 0.0
 
@@ -56,7 +54,7 @@ class Axis:
     modes: int
 
 
-def near_rate(
+def paint_near(
     plan: Plan,
     shape: tuple[int, int],
     gaussians: Gaussians,
@@ -65,8 +63,8 @@ def near_rate(
     disc_rate: Array,
     large: SourceArrays,
     large_rate: Array,
-) -> Array:
-    """Count rate above the coarse meshes' frequencies.
+) -> Callable[[], Array]:
+    """Paint the fine meshes; the function returned transforms them.
 
     Parameters
     ----------
@@ -86,7 +84,8 @@ def near_rate(
 
     Returns
     -------
-    ndarray, shape (ny, nx)
+    callable
+        Returns the count rate above the coarse meshes' frequencies, shape (ny, nx).
 
     Raises
     ------
@@ -94,30 +93,38 @@ def near_rate(
         If the mesh would not fit into memory.
     """
     image: Array | None = None
-    for mesh in fine_meshes(plan):
-        painted, accuracy = gaussians, digits
-        if mesh.apart is not None:
-            accuracy = digits - (plan.digits - mesh.digits)
-            ringing = accuracy - _smoothing(plan, gaussians) > FEWEST_RING_DIGITS
-            painted, accuracy = gaussians.take(ringing), accuracy[ringing]
-        cut = spread_cut(np.maximum(accuracy, FEWEST_CUT_DIGITS))
-        part = _mesh_rate(mesh, shape, painted, cut, discs, disc_rate, large, large_rate)
+    *first, last = fine_meshes(plan)
+    parts = (gaussians, digits, discs, disc_rate, large, large_rate)
+    for mesh in first:
+        part = _at_pixels(*_painted(mesh, shape, *parts), shape)
         image = part if image is None else image + part
-    assert image is not None
-    return image
+    painted = [_painted(last, shape, *parts)]
+
+    def near_rate() -> Array:
+        # taken out of the list: its memory is free before the result is asked for
+        rate = _at_pixels(*painted.pop(), shape)
+        return rate if image is None else rate + image
+
+    return near_rate
 
 
-def _mesh_rate(
+def _painted(
     mesh: FineMesh,
     shape: tuple[int, int],
     gaussians: Gaussians,
-    cut: Array,
+    digits: Array,
     discs: SourceArrays,
     disc_rate: Array,
     large: SourceArrays,
     large_rate: Array,
-) -> Array:
-    """One fine mesh's share of the count rate."""
+) -> tuple[Array, Axis, Axis, Transfer]:
+    """Rows of one fine mesh, its axes and its filter."""
+    plan = mesh.plan
+    if mesh.apart is not None:
+        digits = digits - (plan.digits - mesh.digits)
+        ringing = digits - _smoothing(plan, gaussians) > FEWEST_RING_DIGITS
+        gaussians, digits = gaussians.take(ringing), digits[ringing]
+    cut = spread_cut(np.maximum(digits, FEWEST_CUT_DIGITS))
     y, x = _axes(mesh, shape, gaussians, cut, discs, bool(len(large)))
     if y.count * x.count > LARGEST_MESH:
         raise ValueError(
@@ -133,7 +140,7 @@ def _mesh_rate(
     paint_discs(points, start, cell, discs, disc_rate, spread, mesh.digits)
     if len(large):
         paint_large_discs(points, start, cell, large, large_rate, spread, mesh.digits)
-    return _at_pixels(rows, y, x, filtered, shape)
+    return rows, y, x, filtered
 
 
 def _smoothing(plan: Plan, gaussians: Gaussians) -> Array:
@@ -189,7 +196,7 @@ def _filter(mesh: FineMesh, period_y: int, period_x: int) -> Transfer:
         ky = np.concatenate([ky, -ky[:0:-1]])
     wrapped = wrapped_transfer(plan, NEAR, period_y, period_x, mesh.highest) if plan.wraps else None
     filtered: Transfer = np.empty((ky.size, kx.size), mesh.dtype if plan.optics.radial else complex)
-    for block in blocks(ky.size, ROWS):  # temporary arrays stay small
+    for block in pieces(ky.size):  # temporary arrays stay small
         if wrapped is None:
             part = high_pass(plan, ky[block], kx)
         else:
@@ -219,7 +226,7 @@ def _at_pixels(rows: Array, y: Axis, x: Axis, filtered: Transfer, shape: tuple[i
     def transform_rows(block: slice) -> None:
         half[block] = fft.rfft(rows[block, : x.painted], x.count, axis=1)
 
-    for_each(transform_rows, blocks(y.painted, ROWS))
+    for_each(transform_rows, pieces(y.painted))
     radial = filtered.shape[0] == y.modes + 1
     # a mesh starts before the frame and ends behind it
     in_y, in_x = (slice(-axis.start, n - axis.start) for n, axis in zip(shape, (y, x), strict=True))
@@ -235,11 +242,11 @@ def _at_pixels(rows: Array, y: Axis, x: Axis, filtered: Transfer, shape: tuple[i
         folded = fold_rows(upper, lower, y.period)
         inverted[:, columns] = fft.ifft(folded, axis=0, overwrite_x=True)[in_y]
 
-    for_each(invert_columns, blocks(x.modes + 1, COLUMNS))
+    for_each(invert_columns, pieces(x.modes + 1))
     wanted = np.empty(shape)
 
     def invert_rows(block: slice) -> None:
         wanted[block] = fft.irfft(fold_half(inverted[block], x.period), x.period, axis=1)[:, in_x]
 
-    for_each(invert_rows, blocks(shape[0], ROWS))
+    for_each(invert_rows, pieces(shape[0]))
     return wanted
