@@ -20,7 +20,8 @@ def main() -> None:
     options = arguments([""])
     table = ni.fit_light_curves(plan_of(SYSTEM, options))
     names = [*system_of(SYSTEM).images, "lens galaxy"]
-    ni.plot_light_curves(table, PICTURE, names=names, title=title_of(SYSTEM, options))
+    title = title_of(SYSTEM, options)
+    ni.plot_light_curves(table, PICTURE, names=names, title=title, time_label="time, days")
 
 
 if __name__ == "__main__":

@@ -103,7 +103,11 @@ def recover(number: int, options: argparse.Namespace) -> QTable:
     table = ni.fit_light_curves(plan_of(number, options), folder)
     names = [*system.images, "lens galaxy"]
     ni.plot_light_curves(
-        table, folder / "light_curves.png", names=names, title=title_of(number, options)
+        table,
+        folder / "light_curves.png",
+        names=names,
+        title=title_of(number, options),
+        time_label="time, days",
     )
     # Written last and whole: whoever sees it finds the system finished.
     part = folder / "light_curves.part"

@@ -114,8 +114,11 @@ def test_plot(tmp_path):
     stars = ni.source("point", 20, 15, 4e-15)
     plan = ni.monitor(stars, ni.Observation(shape=(32, 40), exposure=50.0), [0.0, 3.0, 5.0])
     table = ni.fit_light_curves(plan)
-    figure = ni.plot_light_curves(table, tmp_path / "curve.png", names=["A"], title="a star")
+    figure = ni.plot_light_curves(
+        table, tmp_path / "curve.png", names=["A"], title="a star", time_label="time, days"
+    )
     (panel,) = figure.axes
+    assert panel.get_xlabel() == "time, days"
     drawn = panel.containers[0].lines[0].get_xydata()
     np.testing.assert_allclose(drawn, np.transpose([[0, 3, 5], table["flux"].value]))
     bars = panel.containers[0].lines[2][0].get_segments()

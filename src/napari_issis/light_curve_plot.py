@@ -21,6 +21,7 @@ def plot_light_curves(
     *,
     names: Sequence[str] | None = None,
     title: str = "",
+    time_label: str = "time",
 ) -> Any:
     """Plot recovered fluxes with their errors over the planned ones, a panel for each source.
 
@@ -35,6 +36,8 @@ def plot_light_curves(
         Names of the sources, in the order of the source table.
     title : str
         Stands above the panels.
+    time_label : str
+        Stands below them; the unit of the times is the plan's, such as ``time, days``.
 
     Returns
     -------
@@ -79,7 +82,7 @@ def plot_light_curves(
         panel.set_ylabel(label)
         panel.grid(alpha=0.3)
     panels[0].legend(loc="upper right", fontsize=8, ncols=2)
-    panels[-1].set_xlabel("time")
+    panels[-1].set_xlabel(time_label)
     figure.suptitle(title, fontsize=11)
     figure.supylabel("flux, erg s$^{-1}$ cm$^{-2}$ Å$^{-1}$", fontsize=10)
     if path is not None:
