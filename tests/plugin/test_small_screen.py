@@ -9,7 +9,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QLabel
 from small_scene import SMALL, few_sources
 
-from napari_issis import source
+from napari_issis import SKIES, source
 from napari_issis.plugin.canvas_geometry import find_window, to_view_box
 from napari_issis.plugin.dock import SimulatorWidget
 from napari_issis.plugin.panels import LIST_NAME, ROW_NAME, _dock_of
@@ -127,3 +127,14 @@ def test_no_line_of_text_is_cut(panel, qtbot):
     assert panel.instrument.sky in wrapped
     for label in wrapped:
         assert label.height() >= label.heightForWidth(label.width()), label.text()
+
+
+def test_no_line_is_cut_after_another_camera(panel):
+    """Catches rows that keep the heights of the texts before."""
+    scene = panel.scene
+    own = scene.observation.replace(psf=None, sky=SKIES["HST average"])
+    sky = panel.instrument.sky
+    for camera, channel in (("FCU", "FUV"), ("ISSIS", "NUV")):
+        scene.observation = own.replace(instrument=camera, channel=channel)
+        QTest.qWait(300)
+        assert sky.height() >= sky.heightForWidth(sky.width())
