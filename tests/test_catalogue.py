@@ -74,6 +74,33 @@ def test_a_csv_typed_by_hand(tmp_path):
     assert table["r_half"][1] == 5 * u.pix
 
 
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(";", ","), (";", "."), ("\t", "."), ("\t", ","), (",", ".")]
+)
+def test_a_csv_of_a_spreadsheet_in_another_language(tmp_path, separator, decimal):
+    """Catches semicolons and decimal commas that are told to be missing columns."""
+    rows = [
+        ["kind", "x", "y", "flux"],
+        ["point", "12.5", "-3", "1e-15"],
+        ["point", "7", "4.25", "2e-15"],
+    ]
+    text = "\n".join(separator.join(row).replace(".", decimal) for row in rows)
+    path = tmp_path / "table.csv"
+    path.write_text(text + "\n", encoding="utf-8")
+    read = check_sources(read_sources(path))
+    assert read.x.tolist() == [12.5, 7.0]
+    assert read.y.tolist() == [-3.0, 4.25]
+    assert read.flux.tolist() == [1e-15, 2e-15]
+
+
+def test_two_decimal_marks_in_a_column_are_refused(tmp_path):
+    """Catches a thousand for one."""
+    path = tmp_path / "table.csv"
+    path.write_text("kind;x;y;flux\npoint;12,5;3;1e-15\npoint;12.5;3;1e-15\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="row 0, x: '12,5' is not a number"):
+        read_sources(path)
+
+
 def test_points_need_four_columns_only(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("kind,x,y,flux\npoint,1,2,1e-14\n")

@@ -179,7 +179,17 @@ def test_version_and_help(capsys):
         with pytest.raises(SystemExit) as exit_:
             main([option])
         assert exit_.value.code == 0
-    assert "simulate SCENE" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    for command in ("simulate SCENE", "sheet SCENE", "photometry SCENE", "scenes"):
+        assert f"napari-issis {command}" in " ".join(told.split())
+
+
+@pytest.mark.parametrize("zoom", ["0", "65", "1000"])
+def test_a_wrong_zoom_leaves_no_file_behind(zoom, star, capsys):
+    """Catches a FITS file without the picture that was asked for with it."""
+    files = ["--output", "x.fits", "--png", "x.png", "--zoom", zoom]
+    assert f"zoom is {zoom};" in refused(capsys, "simulate", star, *FRAME, *files)
+    assert not Path("x.fits").exists()
 
 
 # --- opening napari, or not ---

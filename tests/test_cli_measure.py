@@ -45,6 +45,14 @@ def test_a_wrong_goal_is_named(words, star, capsys):
     assert not (star / "x.html").exists()
 
 
+@pytest.mark.parametrize("words", [["snr", "20", "1"], ["position", "0.1", "0", "-1"]])
+def test_a_goal_for_a_source_that_is_not_there_is_refused(words, star, capsys):
+    """Catches a page that is written, with the error in its table."""
+    error = refused(capsys, "sheet", "star.ecsv", "--output", "x.html", "--goal", *words)
+    assert f"--goal is '{' '.join(words)}': there is no row {words[-1]}; the table has 1" in error
+    assert not (star / "x.html").exists()
+
+
 def test_photometry_equals_the_library_s(star, capsys):
     """Catches an option that is parsed and then forgotten."""
     arguments = ["photometry", "star.ecsv", *FRAME, "--seed", "4", "--radius", "3", "--scale", "1"]

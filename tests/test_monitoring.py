@@ -1,6 +1,7 @@
 """Sequences of exposures: each frame against `simulate`, and the sky against astropy's."""
 
 import os
+import warnings
 from collections import Counter
 
 import astropy.units as u
@@ -279,3 +280,18 @@ def test_magnitudes_of_a_spectrum_vary_as_its_flux():
     plan = ni.monitor(star, FRAME, [0.0], light_curves={0: lambda time: 0.5})
     whole = ni.expected_counts(star, FRAME)
     assert ni.expected_counts(plan.exposures[0].sources, FRAME) == pytest.approx(0.5 * whole)
+
+
+def test_the_limits_are_told_once_a_sequence():
+    """Catches a warning for each of a hundred exposures, each with other words."""
+    star = ni.source("point", 20, 20, 1e-13)
+    plan = ni.monitor(
+        star, FRAME, range(4), light_curves={0: lambda time: 1 + 0.1 * time}, exposures=1
+    )
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("default")
+        plan.stack().compute(scheduler="synchronous")
+        ni.fit_light_curves(plan)
+    told = [one for one in told if one.category is ni.CountRateWarning]
+    assert len(told) == 1
+    assert "more than 22 cps" in str(told[0].message)

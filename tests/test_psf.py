@@ -169,3 +169,24 @@ def test_a_psf_too_sharp_for_the_pixels_is_refused(psf):
     """A mesh for it would need terabytes: no MemoryError after a minute."""
     with pytest.raises(ValueError, match=r"cycles per pixel.*give it a blur"):
         ni.count_rate(ni.source("point", 8, 8), ni.Observation(shape=(16, 16), psf=psf))
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda width: ni.GaussianPSF(width), "fwhm"),
+        (lambda width: ni.MoffatPSF(fwhm=width, beta=3), "fwhm"),
+        (lambda width: ni.TelescopePSF(1.7, blur_fwhm=width), "blur_fwhm"),
+        (lambda width: ni.TelescopePSF(1.7, jitter_fwhm=width), "jitter_fwhm"),
+        (lambda width: ni.TelescopePSF(1.7, halo_share=0.1, halo_fwhm=width), "halo_fwhm"),
+    ],
+)
+def test_widths_beyond_reason_are_refused_by_name(make, name):
+    """Catches a division by zero in the middle of a render; the widest allowed one renders."""
+    with pytest.raises(ValueError, match=rf"^{name} is 1001; .*1000 arcsec"):
+        make(1001.0)
+    psf = make(1000.0)
+    star = ni.source("point", 16, 16, 1e-14)
+    rate = ni.count_rate(star, ni.Observation(shape=(32, 32), psf=psf))
+    assert np.all(rate >= 0)
+    assert np.all(np.isfinite(rate))

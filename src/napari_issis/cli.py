@@ -14,7 +14,7 @@ from .cli_measure import photometry, sheet
 from .cli_scene import PROGRAM, SCENE_HELP, Parser, add_scene_options, expose_and_tell, read_scene
 from .fits_io import DTYPES, IMAGES
 from .fits_io import SUFFIXES as FITS_SUFFIXES
-from .png import SCALES, write_png, write_source_png
+from .png import SCALES, check_zoom, write_png, write_source_png
 from .png import SUFFIXES as PNG_SUFFIXES
 from .rgba import write_rgba
 from .safe_write import check_target
@@ -107,6 +107,7 @@ def _simulate(words: list[str]) -> None:
         if picture is not None:
             check_target(picture, PNG_SUFFIXES, overwrite=overwrite)
     sources, observation = read_scene(options)
+    check_zoom(options.zoom, observation.shape)
     exposure = expose_and_tell(sources, observation, options.seed, options.tolerance)
     exposure.write(
         options.output,
@@ -149,8 +150,10 @@ def _open(words: list[str]) -> None:
         prog=PROGRAM,
         description="Open napari with the simulator docked. Without a screen, write the scene "
         "to a FITS and a PNG file in the current folder instead.",
-        epilog=f"Also: '{PROGRAM} simulate SCENE --output X.fits' simulates without a screen, "
-        f"'{PROGRAM} scenes' lists the built-in scenes; each has its own --help.",
+        epilog=f"Also, without a screen: '{PROGRAM} simulate SCENE --output X.fits' simulates, "
+        f"'{PROGRAM} sheet SCENE --output X.html' writes a proposal sheet, '{PROGRAM} photometry "
+        f"SCENE --output X.ecsv' measures in apertures, '{PROGRAM} scenes' lists the built-in "
+        "scenes. Each has its own --help.",
     )
     parser.add_argument("scene", metavar="SCENE", nargs="?", help=SCENE_HELP)
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")

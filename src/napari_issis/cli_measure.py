@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from .apertures import SKIES as SKY_LEVELS
 from .apertures import aperture_photometry
 from .cli_scene import PROGRAM, Parser, add_scene_options, expose_and_tell, read_scene
+from .exposure_goal import checked_rows
 from .result_table import SUFFIXES as TABLE_SUFFIXES
 from .result_table import write_table
 from .safe_write import check_target
@@ -42,6 +44,8 @@ def sheet(words: list[str]) -> None:
     goals = [_goal(words) for words in options.goal]
     check_target(options.output, SHEET_SUFFIXES, overwrite=options.overwrite)
     sources, observation = read_scene(options)
+    for goal, words in zip(goals, options.goal, strict=True):
+        _check_rows(goal, words, len(sources))
     proposal_sheet(
         sources,
         observation,
@@ -100,7 +104,14 @@ def photometry(words: list[str]) -> None:
     print(f"wrote {options.output}")
 
 
-def _goal(words: list[str]) -> Mapping[str, object]:
+def _check_rows(goal: Mapping[str, Any], words: list[str], count: int) -> None:
+    try:
+        checked_rows(words[0], goal["rows"], count)
+    except ValueError as error:
+        raise ValueError(f"--goal is {' '.join(words)!r}: {error}") from error
+
+
+def _goal(words: list[str]) -> Mapping[str, Any]:
     name, *rest = words
     try:
         value, rows = float(rest[0]), [int(row) for row in rest[1:]]

@@ -14,7 +14,7 @@ from .facts import Fact, check_numbers, number
 from .filter_set import NamedFilter, NeutralFilter
 from .filters import Filter
 from .passband import HC, Passband
-from .psf import WIDEST, TelescopePSF
+from .psf import BROADEST, WIDEST, TelescopePSF
 
 OPEN = "open"
 
@@ -94,10 +94,10 @@ class Channel:
     area_wavelength: tuple[float, ...] = number(
         "Angstrom", default=(), low=10, high=1e5, count=None, rising=True
     )
-    blur_fwhm: float = number("arcsec", default=0.0, high=1000)
-    jitter_fwhm: float = number("arcsec", default=0.0, high=1000)
+    blur_fwhm: float = number("arcsec", default=0.0, high=BROADEST)
+    jitter_fwhm: float = number("arcsec", default=0.0, high=BROADEST)
     halo_share: float = number(default=0.0)
-    halo_fwhm: float = number("arcsec", default=0.0, high=1000)
+    halo_fwhm: float = number("arcsec", default=0.0, high=BROADEST)
     sky_total: float | None = number("ct / (s pix)", default=None, high=1e9)
     sky_earthshine_and_zodiacal: float | None = number("ct / (s pix)", default=None, high=1e9)
     dark: float = number("ct / (s pix)", default=0.0, high=1e9)

@@ -106,6 +106,24 @@ class _Breach:
         messages[-1] += f" {self._cure()}"
         return messages
 
+    def of_a_sequence(self) -> list[str]:
+        """Name the limits alone: the same words for all exposures that break them."""
+        camera = self.observation.instrument
+        detector = camera.limits_note or f"the detector of {camera.name}"
+        local_limit, total_limit = self.limits
+        messages = []
+        if self.total > total_limit:
+            messages.append(
+                f"Exposures of the sequence receive more than {total_limit:.0e} cps in all; "
+                f"{detector} is linear up to that."
+            )
+        if self.peak > local_limit:
+            messages.append(
+                f"Exposures of the sequence have pixels that receive more than {local_limit:g} "
+                f"cps; {detector} counts linearly below that. Simulate one of them to see where."
+            )
+        return messages
+
     def briefly(self) -> str:
         local_limit, total_limit = self.limits
         if self.peak > local_limit:
@@ -154,6 +172,16 @@ def warn_of_count_rates(
         rate, observation.background_rate, sources=sources, observation=observation
     ):
         warnings.warn(message, CountRateWarning, stacklevel=stacklevel + 1)
+
+
+def warn_of_a_sequence(rate: NDArray[np.float64], observation: Observation) -> None:
+    """Issue a `CountRateWarning` for each limit that an exposure of a sequence breaks.
+
+    Its text is the same for all of them, so that Python and napari show it once.
+    """
+    breach = _breach(rate, observation.background_rate, None, observation)
+    for message in [] if breach is None else breach.of_a_sequence():
+        warnings.warn(message, CountRateWarning, stacklevel=2)
 
 
 def _names(sources: Table, rows: NDArray[np.int64]) -> str:

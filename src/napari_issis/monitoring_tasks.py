@@ -11,7 +11,7 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from .exposure import Exposure, expected_of_rate, expose, noise_ready_rate, same_table
-from .limits import warn_of_count_rates
+from .limits import warn_of_a_sequence
 from .observation import Observation
 from .source_image import SourceImage
 
@@ -122,7 +122,7 @@ def rate_of(
     The images that sources are come along, as another process does not know them by name.
     """
     rate, clipped = noise_ready_rate(sources, observation, tolerance=tolerance)
-    warn_of_count_rates(rate, sources, observation)
+    warn_of_a_sequence(rate, observation)
     return rate, clipped
 
 

@@ -107,7 +107,7 @@ def image_picture(
         raise ValueError(f"scale is {scale!r}; known: {', '.join(SCALES)}.")
     if isinstance(colormap, str) and colormap not in COLORMAPS:
         raise ValueError(f"colormap is {colormap!r}; known: {', '.join(COLORMAPS)}.")
-    _check_zoom(zoom, values.shape)
+    check_zoom(zoom, values.shape)
     low, high = _limits(values, limits)
     brightness = np.rint(255 * _stretch(scale)(_normalised(values, low, high))).astype(np.uint8)
     magnified = np.flipud(brightness).repeat(zoom, axis=0).repeat(zoom, axis=1)
@@ -155,7 +155,7 @@ def write_source_png(
     """
     arrays = check_sources(sources, pixel_scale=pixel_scale)
     ny, nx = Observation(shape=shape).shape
-    _check_zoom(zoom, (ny, nx))
+    check_zoom(zoom, (ny, nx))
     picture = Image.new("RGB", (nx * zoom, ny * zoom))
     draw = ImageDraw.Draw(picture)
     reach = np.maximum(arrays.r_half, STAR_RADIUS)
@@ -213,7 +213,8 @@ def _save(
         picture.save(file, format="PNG", pnginfo=text)
 
 
-def _check_zoom(zoom: int, shape: tuple[int, ...]) -> None:
+def check_zoom(zoom: int, shape: tuple[int, ...]) -> None:
+    """Raise a ValueError if an image of this shape cannot be magnified so."""
     if isinstance(zoom, bool) or not hasattr(zoom, "__index__") or not 1 <= zoom <= 64:
         raise ValueError(f"zoom is {zoom!r}; it must be a whole number from 1 to 64.")
     if max(shape) * zoom > LONGEST_SIDE:

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 ARCSEC_PER_RADIAN = 180 * 3600 / np.pi
 WIDEST = 1e4  # m
+# Widest blur, arcsec. Much wider ones leave no light to transform.
+BROADEST = 1000.0
 FWHM_PER_SIGMA = 2 * np.sqrt(2 * np.log(2))
 
 
@@ -59,6 +61,17 @@ def positive(name: str, value: float | None, unit: str, *, zero: bool = False) -
         least = "zero or more" if zero else "positive"
         raise ValueError(f"{name} is {value}; it must be a finite number of {unit}, {least}.")
     return value
+
+
+def _width(name: str, value: float, *, zero: bool = False) -> float:
+    """Return a full width at half maximum in arcsec, or raise a ValueError that names it."""
+    width = positive(name, value, "arcsec", zero=zero)
+    if width > BROADEST:
+        raise ValueError(
+            f"{name} is {width:g}; widths of at most {BROADEST:g} arcsec can be rendered. "
+            "Is it in another unit?"
+        )
+    return width
 
 
 class RadialPSF:
@@ -117,7 +130,7 @@ class GaussianPSF(RadialPSF):
     fwhm: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "fwhm", positive("fwhm", self.fwhm, "arcsec"))
+        object.__setattr__(self, "fwhm", _width("fwhm", self.fwhm))
 
     def otf(self, k: ArrayLike) -> Array:
         """exp(-2 pi^2 sigma^2 k^2)."""
@@ -140,7 +153,7 @@ class MoffatPSF(RadialPSF):
     beta: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "fwhm", positive("fwhm", self.fwhm, "arcsec"))
+        object.__setattr__(self, "fwhm", _width("fwhm", self.fwhm))
         beta = float(self.beta)
         if not 1 < beta <= 100:
             raise ValueError(f"beta is {beta}; it must be above 1 and at most 100.")
@@ -212,7 +225,7 @@ class TelescopePSF(RadialPSF):
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         for name in ("jitter_fwhm", "halo_fwhm"):
-            set_(self, name, positive(name, getattr(self, name), "arcsec", zero=True))
+            set_(self, name, _width(name, getattr(self, name), zero=True))
         share = positive("halo_share", self.halo_share, "1 (a share)", zero=True)
         if share > 1:
             raise ValueError(f"halo_share is {share}; it must be a share from 0 to 1.")
@@ -225,7 +238,7 @@ class TelescopePSF(RadialPSF):
                 f"diameter is {self.diameter:g}; apertures of at most {WIDEST:g} metres can be "
                 "rendered. Is it in another unit?"
             )
-        set_(self, "blur_fwhm", positive("blur_fwhm", self.blur_fwhm, "arcsec", zero=True))
+        set_(self, "blur_fwhm", _width("blur_fwhm", self.blur_fwhm, zero=True))
         obscuration = float(self.obscuration)
         if not 0 <= obscuration < 1:
             raise ValueError(f"obscuration is {obscuration}; it must lie in [0, 1).")

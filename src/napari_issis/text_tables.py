@@ -7,8 +7,10 @@ that astropy writes for columns are let through, and no references within refere
 from __future__ import annotations
 
 import os
+import re
 from itertools import takewhile
 
+import numpy as np
 import yaml
 from astropy.table import QTable
 
@@ -22,6 +24,7 @@ MOST_COLUMNS = 2000
 # YAML is read slowly: this takes about a second.
 MOST_HEADER = 100_000
 DEEPEST = 20
+DECIMAL = re.compile(r"[+-]?\d+(,\d*)?([eE][+-]?\d+)?")
 TAGS = (
     *(
         f"tag:yaml.org,2002:{name}"
@@ -58,10 +61,16 @@ def read_text_table(path: str | os.PathLike[str], kind: str) -> QTable:
     if kind == "ecsv":
         _check_yaml(lines)
     start = next((line for line in lines if line.strip() and not line.startswith("#")), "")
-    columns = max(len(start.split()), 1 + start.count(","))
+    separator = _separator(start) if kind == "csv" else ","
+    columns = max(len(start.split()), 1 + start.count(separator))
     if columns > MOST_COLUMNS:
         raise ValueError(f"it has {columns} columns; {MOST_COLUMNS} at most.")
-    return QTable.read(lines, format=f"ascii.{kind}")
+    if separator == ",":
+        return QTable.read(lines, format=f"ascii.{kind}")
+    table = QTable.read(lines, format="ascii.csv", delimiter=separator)
+    for name in table.colnames:
+        _read_decimal_commas(table, name)
+    return table
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
@@ -87,6 +96,19 @@ def read_text(path: str | os.PathLike[str]) -> str:
     if not text.strip():
         raise ValueError(f"{path} is empty.")
     return text
+
+
+def _separator(header: str) -> str:
+    """Tell what separates columns: semicolons or tabs where the header has no comma."""
+    return next((one for one in ",;\t" if one in header), ",")
+
+
+def _read_decimal_commas(table: QTable, name: str) -> None:
+    """Make numbers of a column such as 20,5; spreadsheets in many languages write so."""
+    cells = [str(cell).strip() for cell in table[name]]
+    numbers = [cell.replace(",", ".") for cell in cells if DECIMAL.fullmatch(cell)]
+    if len(numbers) == len(cells) and any("," in cell for cell in cells):
+        table[name] = np.array(numbers, dtype=np.float64)
 
 
 def _lines(text: str) -> list[str]:

@@ -394,6 +394,8 @@ def test_open_sample_gives_a_live_scene(make_napari_viewer, npe2pm, qtbot, monke
         qtbot.waitUntil(lambda: asked == [4], timeout=5000)
         assert len(viewer.layers) == 3
         assert len(scene.sources) == 4
+        # else neither mouse nor keys reach the scene that was kept
+        assert viewer.layers.selection.active is scene.layers[-1]
         monkeypatch.setattr(exposure_layers, "may_replace", lambda count: True)
         viewer.open_sample("napari-issis", "blend")
         qtbot.waitUntil(lambda: len(viewer.layers) == 3, timeout=5000)

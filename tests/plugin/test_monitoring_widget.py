@@ -39,7 +39,7 @@ def planned(widget):
 
 
 def click(widget, words, qtbot=None):
-    button = next(one for one in widget.buttons if words in one.text())
+    button = next(one for one in widget.buttons if words in one.text().replace("&", ""))
     button.click()
     if qtbot is not None:
         qtbot.waitUntil(lambda: not widget.busy, timeout=PATIENCE)

@@ -137,6 +137,24 @@ def test_the_status_line(scene):
     )
 
 
+def test_the_status_line_follows_the_picture(scene, qtbot):
+    """Catches counts of the picture before, told of a pixel of the new one."""
+    scene.viewer.cursor.position = (50.0 * 0.036, 60.0 * 0.036)
+    scene.viewer.status = "what napari has to say"
+    assert scene.exposure.counts[50, 60] > 100
+    scene.remove(scene.editor.source_id.tolist())
+    scene.wait()
+    counts = scene.exposure.counts[50, 60]
+    assert counts < 100
+    qtbot.waitUntil(lambda: f"   C {counts}   " in scene.viewer.status, timeout=2000)
+    scene.viewer.layers.selection.active = scene.viewer.add_points(np.zeros((1, 2)))
+    scene.viewer.status = "his"
+    scene.undo()
+    scene.wait()
+    qtbot.wait(150)
+    assert scene.viewer.status == "his"
+
+
 def test_the_status_line_of_others(scene):
     """Catches a status line that is ours while the user works on his own layer."""
     scene.viewer.add_points(np.zeros((1, 2)))

@@ -78,6 +78,16 @@ def test_one_press_picks_on_either_layer(scene, mouse):
     assert row(scene, 1)[0] == pytest.approx(62.0)
 
 
+def test_the_tool_for_vertices_picks_as_the_arrow_does(scene, mouse):
+    """Catches a press that does nothing: the two arrows of napari's tools look much the same."""
+    ellipses = scene.editor.ellipses.layer
+    scene.viewer.layers.selection.active = ellipses
+    ellipses.mode = "direct"
+    mouse.drag((60.0, 50.0), (63.0, 51.0))
+    scene.wait()
+    assert (scene.sources["x"][1], scene.sources["y"][1]) == (63.0, 51.0)
+
+
 def test_a_layer_of_the_user_keeps_the_mouse(scene, mouse):
     """Catches a pick that takes the mouse from somebody else's layer."""
     own = scene.viewer.add_points(np.array([[0.0, 0.0]]))

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from astropy.table import vstack
 from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QLabel
 from small_scene import SMALL, few_sources
 
+from napari_issis import SKIES, source
 from napari_issis.plugin.canvas_geometry import find_window, to_view_box
 from napari_issis.plugin.dock import SimulatorWidget
 from napari_issis.plugin.panels import LIST_NAME, ROW_NAME, _dock_of
@@ -106,3 +109,32 @@ def test_list_and_traces_together(panel, list_first):
     assert row.geometry().right() >= canvas.geometry().right() - 1
     assert canvas.height() > 0.5 * window.height()
     assert window.height() <= 768
+
+
+def test_no_line_of_text_is_cut(panel, qtbot):
+    """Catches labels that wrap and are squeezed by the warning below them."""
+    scene = panel.scene
+    scene.sources = vstack(2 * [source("point", 30, 30, 1e-13)])
+    scene.wait()
+    qtbot.waitUntil(panel.instrument.warning.isVisible, timeout=2000)
+    QTest.qWait(100)
+    wrapped = [
+        label
+        for label in panel.instrument.findChildren(QLabel)
+        if label.isVisible() and label.wordWrap() and label.text()
+    ]
+    assert panel.instrument.warning in wrapped
+    assert panel.instrument.sky in wrapped
+    for label in wrapped:
+        assert label.height() >= label.heightForWidth(label.width()), label.text()
+
+
+def test_no_line_is_cut_after_another_camera(panel):
+    """Catches rows that keep the heights of the texts before."""
+    scene = panel.scene
+    own = scene.observation.replace(psf=None, sky=SKIES["HST average"])
+    sky = panel.instrument.sky
+    for camera, channel in (("FCU", "FUV"), ("ISSIS", "NUV")):
+        scene.observation = own.replace(instrument=camera, channel=channel)
+        QTest.qWait(300)
+        assert sky.height() >= sky.heightForWidth(sky.width())

@@ -49,7 +49,7 @@ class DisplayForm(Form):
         self.auto = PushButton(text="Auto", tooltip="Choose the limits by the picture")
         self.bar = ColorBar(scene)
         self.add("Ima&ge", self.shows)
-        self.add("&Brightness", self.scale)
+        self.add("Bright&ness", self.scale)
         self.add("Li&mits (ct)", self.low, self.high, self.auto)
         self.units = QLabel()
         self.add_native(self.units, self.bar)

@@ -80,8 +80,8 @@ class SimulatorWidget(QWidget):  # type: ignore[misc]
         tools = QHBoxLayout()
         tools.setContentsMargins(4, 0, 4, 0)
         # what they would do is told by `show_steps`
-        self.undo = push_button("&Undo", "", self.scene.undo)
-        self.redo = push_button("&Redo", "", self.scene.redo)
+        self.undo = push_button("Undo", "", self.scene.undo)
+        self.redo = push_button("Redo", "", self.scene.redo)
         self.list = push_button("S&ources", "Show or hide the list of sources", self.toggle_list)
         self.png = QPushButton("PNG")
         self.png.setToolTip("Save the final image, the source model or RGBA data as a picture")

@@ -75,6 +75,9 @@ def adopt_layers(viewer: Any) -> None:
     if len(scene.sources) == 0 or may_replace(len(scene.sources)):
         scene.observation, scene.seed = exposure.observation, exposure.seed
         open_scene(exposure.sources, viewer=viewer)
+    elif scene.layers:
+        # the mouse and the keys of the scene need one of its layers to be active
+        viewer.layers.selection.active = scene.layers[-1]
 
 
 def may_replace(count: int) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from qtpy.QtCore import QEvent, QObject, Qt
+from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import (
     QComboBox,
     QFormLayout,
@@ -26,6 +27,31 @@ class Field(Protocol):
     @property
     def tooltip(self) -> str | None:
         """What it is for."""
+
+
+class WrappedText(QLabel):  # type: ignore[misc]
+    """Text that wraps and is given the height that it needs.
+
+    After a change of texts Qt's form layout divides the height among such rows as it was before.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setWordWrap(True)
+        self.setMinimumWidth(10)
+
+    def setText(self, text: str | None) -> None:
+        """Show a text."""
+        super().setText(text)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Follow the width."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        self.setMinimumHeight(max(self.heightForWidth(self.width()), 0))
 
 
 class Form(QGroupBox):  # type: ignore[misc]
@@ -73,9 +99,7 @@ class Form(QGroupBox):  # type: ignore[misc]
 
     def add_text(self, tooltip: str) -> QLabel:
         """Add a row of text that wraps; return the label to write on."""
-        text = QLabel()
-        text.setWordWrap(True)
-        text.setMinimumWidth(10)
+        text = WrappedText()
         text.setToolTip(tooltip)
         text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._rows.addRow(text)

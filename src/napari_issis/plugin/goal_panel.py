@@ -23,7 +23,7 @@ from ..fisher import Covariance, covariance
 from ..limits import count_rate_warnings
 from ..observation import Observation
 from .goal_plot import GoalCurve, GoalPlot
-from .instrument_form import WARNING_STYLE
+from .instrument_form import style_warning
 from .number_field import NumberField
 from .push_button import push_button
 from .scene import open_scene
@@ -68,7 +68,7 @@ class GoalPanel(QWidget):  # type: ignore[misc]
         self.plot = GoalPlot()
         self.warning = QLabel()
         self.warning.setWordWrap(True)
-        self.warning.setStyleSheet(WARNING_STYLE)
+        style_warning(self.warning)
         self.button = push_button(
             "&Use this exposure",
             "Set the scene's exposure time to the one that reaches the goal",

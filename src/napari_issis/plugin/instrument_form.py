@@ -8,7 +8,7 @@ from typing import Any
 
 from magicgui.widgets import CheckBox, ComboBox, PushButton
 from napari.utils.notifications import show_error
-from qtpy.QtWidgets import QFileDialog
+from qtpy.QtWidgets import QFileDialog, QLabel
 
 from ..filters import Filter
 from ..instrument import Instrument
@@ -26,7 +26,17 @@ from .scene import Scene
 LOAD = "load"
 # Black on amber is readable in napari's dark and light themes.
 WARNING_NOTE = "The limits are those of HST ACS/SBC, the nearest analogue."
-WARNING_STYLE = "color: #111; background: #ffcf5c; padding: 3px; border-radius: 3px;"
+WARNING_STYLE = "color: #111; background: #ffcf5c; padding: 0px; border-radius: 3px;"
+
+
+def style_warning(label: QLabel) -> None:
+    """Let a label stand out.
+
+    Its margin is Qt's own: of a style sheet's padding a label that wraps its text knows nothing
+    when it is asked for its height, and the labels around it are squeezed.
+    """
+    label.setStyleSheet(WARNING_STYLE)
+    label.setMargin(3)
 
 
 class InstrumentForm(Form):
@@ -72,7 +82,7 @@ class InstrumentForm(Form):
             "seed", scene.seed, "Seed of the Poisson noise of the picture; takes effect with Enter"
         )
         self.new_noise = PushButton(text="&New noise", tooltip="Draw the noise anew (next seed)")
-        self.add("Camera, &channel", self.camera, self.channel)
+        self.add("Came&ra, channel", self.camera, self.channel)
         self.sky_model = ComboBox(
             choices=_skies(scene.observation),
             tooltip="Sky: the paper's constants (CIS), HST's levels, or that of a high orbit",
@@ -96,7 +106,7 @@ class InstrumentForm(Form):
         self.sky = self.add_text("Background with the filters in place, by parts")
         self.psf = PsfRows(self, scene)
         self.warning = self.add_text(WARNING_NOTE)
-        self.warning.setStyleSheet(WARNING_STYLE)
+        style_warning(self.warning)
         self._labelled: tuple[Any, ...] = ()
         self._shown: tuple[Any, ...] = (
             scene.observation.exposure,

@@ -69,8 +69,8 @@ class MonitoringForm(Form):
         self.seed = SeedField("seed", start.seed, "Of the walk and of the exposures' noise")
         self.add("&Epochs", self.epochs, self.exposures).setToolTip("Epochs, and exposures of each")
         self.add("Each (days)", self.cadence)
-        self.add("Dither (pix)", self.dither)
-        self.add("Roll (deg)", self.roll)
+        self.add("Dither (px)", self.dither)
+        self.add("Roll (°)", self.roll)
         self.add("Light curve", self.curve)
         self._varying = [
             self.add("Amplitude (mag)", self.amplitude),

@@ -60,10 +60,10 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
         self.scene = open_scene(viewer=napari_viewer, dock=False)
         self.form = MonitoringForm()
         self.buttons = [
-            push_button("S&how stack", "Add the epochs as a layer with a slider", self.show_stack),
-            push_button("Save &cube…", "Save one co-added frame an epoch as FITS", self.save_cube),
+            push_button("Show stac&k", "Add the epochs as a layer with a slider", self.show_stack),
+            push_button("Save cube…", "Save one co-added frame an epoch as FITS", self.save_cube),
             push_button(
-                "&Light curves",
+                "Li&ght curves",
                 "Simulate all exposures, fit all fluxes at each epoch, and plot them",
                 self.recover,
             ),

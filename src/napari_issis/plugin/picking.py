@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-PICKING_MODES = ("pan_zoom", "select")
+# "direct" moves single vertices, which ellipses and images have none of
+PICKING_MODES = ("pan_zoom", "select", "direct")
 
 
 def source_under(layers: Any, ours: list[Any], position: Any) -> tuple[Any, int | None] | None:

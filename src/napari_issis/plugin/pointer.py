@@ -28,11 +28,15 @@ class Pointer:
     def __init__(self, scene: Any) -> None:
         self.scene, self.viewer = scene, scene.viewer
         self.shown = ""
+        self._told = ""
         self.viewer.mouse_drag_callbacks.append(self._press)
         self.viewer.mouse_double_click_callbacks.append(self._double_click)
         self.viewer.cursor.events.position.connect(self._moved)
         self.viewer.events.status.connect(self._status)
         self._describe_soon = qthrottled(self.describe, timeout=REST)
+        self._tell_anew_soon = qthrottled(self._tell_anew, timeout=REST)
+        # the pixel under a pointer at rest changes with the picture
+        scene.events.shown.connect(self._picture_shown)
 
     def _press(self, _viewer: Any, event: Any) -> Iterator[None]:
         """Let the press pick the source under the pointer, and only it unless Shift is held.
@@ -107,6 +111,14 @@ class Pointer:
             return ""
         return source_text(scene.editor.sources[place], scene.observation, scene.units)
 
+    def _picture_shown(self, event: Any = None) -> None:
+        if self._told and self.viewer.status == self._told:
+            self._tell_anew_soon()
+
+    def _tell_anew(self) -> None:
+        if self.viewer.status == self._told:
+            self._status()
+
     def _status(self, event: Any = None) -> None:
         """Put the pixel under the pointer into the status line, where napari shows its own."""
         image = self.scene.counts.layer
@@ -116,7 +128,10 @@ class Pointer:
             return
         y, x = image.world_to_data(self.viewer.cursor.position)[-2:]
         text = pixel_text(picture.exposure, x, y)
-        if text and self.viewer.status != text:
+        if not text:
+            return
+        self._told = text
+        if self.viewer.status != text:
             self.viewer.status = text
 
 

@@ -154,7 +154,7 @@ class SourceForm(Form):
         )
 
     def _lay_out(self) -> None:
-        units = self.add("Unit&s", self.flux_unit, self.length_unit)
+        units = self.add("&Units", self.flux_unit, self.length_unit)
         units.layout().setStretch(0, 5)
         units.layout().setStretch(1, 4)
         self.add("&Mode", self.mode)

@@ -55,10 +55,10 @@ class ViewForm(Form):
             choices=[("frame", "frame"), ("selected sources", "selected")],
             tooltip="About what to zoom; the frame, while no source is selected",
         )
-        self.scale_bar = CheckBox(text="&Scale bar", tooltip="napari's scale bar, in arcsec")
-        self.compass = CheckBox(text="&N, E", tooltip="Mark north and east, by the roll")
+        self.scale_bar = CheckBox(text="Scale &bar", tooltip="napari's scale bar, in arcsec")
+        self.compass = CheckBox(text="N, E", tooltip="Mark north and east, by the roll")
         self.trace = CheckBox(
-            text="Tra&ces",
+            text="T&races",
             tooltip="Plot the row and the column under the pointer "
             f"({shown(FREEZE_KEY)} freezes them)",
         )
