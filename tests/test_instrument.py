@@ -212,6 +212,10 @@ def test_another_camera_keeps_what_it_has(mine):
     assert (after.channel, after.filters) == ("A", ("open", "open"))
     assert (after.exposure, after.shape, after.sky) == (7.0, (64, 32), ni.Sky())
     assert before.replace(instrument="FCU").filters == ("open", "open")
+    # a default gives way to a default, a sky that was chosen stays
+    assert after.replace(instrument="ISSIS").sky == before.sky == ni.SKIES["CIS"]
+    low = ni.Sky(zodiacal="low")
+    assert before.replace(sky=low).replace(instrument=mine).replace(instrument="ISSIS").sky == low
     sbc = before.replace(instrument="ACS/SBC", filters=("F140LP", "open"))
     assert sbc.channel == "FUV"
     assert 0 < sbc.transmittance < 0.8

@@ -125,7 +125,7 @@ class Observation:
             set_(self, "dark", _number("dark", self.dark, "cps per pixel", positive=False))
         checked_detector(self.detector)
         if cast(object, self.sky) is None:
-            set_(self, "sky", Sky() if self.channel_data.sky is None else CIS)
+            set_(self, "sky", _default_sky(self.channel_data))
         if not isinstance(self.sky, SkyModel):
             raise ValueError(f"sky is {self.sky!r}; give a Sky, or one of SKIES by its key.")
         low, high = self.channel_data.band
@@ -165,7 +165,7 @@ class Observation:
         """Return a copy with some values changed.
 
         With another instrument, its own channel, filters and sky take the place of those that
-        it does not have.
+        it does not have, and a default sky gives way to the other's.
         """
         if "instrument" in changes:
             changes = {**self._kept_with(changes["instrument"], changes), **changes}
@@ -183,7 +183,7 @@ class Observation:
             kept["filters"] = tuple(
                 one if passes(camera, channel, one) else OPEN[0] for one in self.filters
             )
-        if own.sky is None and self.sky == CIS:
+        if self.sky == _default_sky(self.channel_data) or (own.sky is None and self.sky == CIS):
             kept["sky"] = None
         return kept
 
@@ -317,6 +317,10 @@ class Observation:
 @lru_cache(maxsize=64)
 def _passband(channel: Channel, curves: tuple[Filter, ...]) -> Passband:
     return Passband(channel.band, channel.cps_per_flux, curves, channel.response)
+
+
+def _default_sky(channel: Channel) -> SkyModel:
+    return Sky() if channel.sky is None else CIS
 
 
 @lru_cache(maxsize=64)
