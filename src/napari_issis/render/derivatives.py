@@ -139,7 +139,7 @@ def _image_reach(optics: Optics, level: float) -> float:
     taper = _Taper(optics.extent + 20.0)
     n = 2 * taper.half + 1
     here = np.full(1, float(taper.half))
-    one = replace(_POINT, x=here, y=here)
+    one = replace(POINT, x=here, y=here)
     image = _images(optics, one, (taper, taper), (slice(0, n), slice(0, n)))[0]
     offset = np.arange(n) - here
     bright = np.abs(image) > level
@@ -205,7 +205,8 @@ def _cos_sin(angle: Array) -> tuple[Array, Array]:
 
 
 _NOTHING = np.zeros(1)
-_POINT = SourceArrays(
+# One point at the origin.
+POINT = SourceArrays(
     np.array(["point"]),
     *(_NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING),
     np.array([""]),
@@ -214,7 +215,7 @@ _POINT = SourceArrays(
 
 @lru_cache(maxsize=16)
 def _point_limit(optics: Optics) -> float:
-    return highest_frequency(optics, _POINT, 1.0, TAIL / optics.point_area)
+    return highest_frequency(optics, POINT, 1.0, TAIL / optics.point_area)
 
 
 @lru_cache(maxsize=16)
