@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sources import IMAGE, SourceArrays
+from .broad import Ellipses, broad_images, split
 from .moving import highest_frequency, point_reach, profile_half_sizes
 from .optics import Optics, Transfer
 from .small_products import stack_product
@@ -33,6 +34,12 @@ STEP = 1e-4
 TAIL = 1e-7
 # point sources computed at once
 CHUNK = 32
+# half-size of a window in pixels from which a smooth profile is computed on several meshes
+BROAD = 100
+# shares of a point's peak where the PSF's wings end around a profile's core and on meshes
+CORE_LEVEL, FAR_LEVEL = 1e-6, 1e-7
+# half-size of a core in pixels above which the profile is not computed so
+LARGEST_CORE = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,16 +123,60 @@ def derivatives(
     for i in np.setdiff1d(np.arange(len(sources)), points):
         one = sources.take(slice(i, i + 1))
         tapers = _tapers(one, wing, float(level[i]), shape)
+        whole = slice(0, shape[0]), slice(0, shape[1])
         if tapers is None:
-            whole = slice(0, shape[0]), slice(0, shape[1])
-            result[i] = Derivatives(whole, wide_images(optics, one, shape))
+            broad = _broad(optics, one, None, whole)
+            result[i] = Derivatives(
+                whole, wide_images(optics, one, shape) if broad is None else broad
+            )
             continue
-        half = tuple(each.half for each in tapers)
+        half = tapers[0].half, tapers[1].half
         row, column = round(float(one.y[0])) - half[0], round(float(one.x[0])) - half[1]
         window = overlap(shape, row, column, (2 * half[0] + 1, 2 * half[1] + 1))
         if window is not None:
-            result[i] = Derivatives(window, _images(optics, one, tapers, window))
+            broad = _broad(optics, one, tapers, window) if max(half) > BROAD else None
+            result[i] = Derivatives(
+                window, _images(optics, one, tapers, window) if broad is None else broad
+            )
     return result
+
+
+def _broad(
+    optics: Optics, one: SourceArrays, tapers: tuple[_Taper, _Taper] | None, window: Window
+) -> Array | None:
+    """Images of a smooth profile on a large window; None where its core is as large."""
+    if not np.isfinite(one.index[0]):
+        return None
+    core, parts = split(one)
+    wing = _reach(optics, CORE_LEVEL / optics.point_area)
+    longest = core.r_half * float(core.sigma.max(initial=0.0))
+    taper = _Taper(float(np.hypot(wing, 5 * longest)))
+    if taper.half > LARGEST_CORE:
+        return None
+    y, x = float(one.y[0]), float(one.x[0])
+    (ny, nx), (top, left) = zip(*((w.stop - w.start, w.start) for w in window), strict=True)
+    far = min(_reach(optics, FAR_LEVEL / optics.point_area), float(max(ny, nx)))
+    images = broad_images(optics, parts, y - top, x - left, (ny, nx), far)
+    n = 2 * taper.half + 1
+    near = overlap((ny, nx), round(y) - taper.half - top, round(x) - taper.half - left, (n, n))
+    if near is not None and core.sigma.size:
+        rows, columns = near
+        placed = (
+            slice(rows.start + top, rows.stop + top),
+            slice(columns.start + left, columns.stop + left),
+        )
+        images[:, rows, columns] += _images(optics, one, (taper, taper), placed, core)
+    if tapers is not None:
+        (end_y, slope_y), (end_x, slope_x) = (
+            each.values(np.arange(w.start, w.stop, dtype=np.float64) - v)
+            for each, w, v in zip(tapers, window, (y, x), strict=True)
+        )
+        end = end_y[:, None] * end_x
+        image = images[0].copy()
+        images *= end
+        images[1] += image * (end_y[:, None] * slope_x)
+        images[2] += image * (slope_y[:, None] * end_x)
+    return images
 
 
 def _reach(optics: Optics, level: float) -> float:
@@ -250,9 +301,16 @@ def _inside(
 
 
 def _images(
-    optics: Optics, one: SourceArrays, tapers: tuple[_Taper, _Taper], window: Window
+    optics: Optics,
+    one: SourceArrays,
+    tapers: tuple[_Taper, _Taper],
+    window: Window,
+    core: Ellipses | None = None,
 ) -> Array:
-    """Image and derivatives of one source on a window, shape (3 or 6, ny, nx)."""
+    """Image and derivatives of one source on a window, shape (3 or 6, ny, nx).
+
+    If there is a ``core``, of these Gaussians of the source alone.
+    """
     limit = (
         _point_limit(optics)
         if one.kind[0] == "point"
@@ -265,7 +323,8 @@ def _images(
     spectra: list[Transfer] = [optics.transfer(ky, kx) * weight]
     if one.kind[0] != "point":
         system = spectra[0]
-        spectra = [system * each for each in _transforms(one, ky, kx)]
+        own = _transforms(one, ky, kx) if core is None else core.transforms(ky, kx)
+        spectra = [system * each for each in own]
     value_y, slope_y = _phases(tapers[0], ky, window[0], float(one.y[0]))
     value_x, slope_x = _phases(tapers[1], kx, window[1], float(one.x[0]))
     along_x = spectra[0] @ value_x.T
