@@ -1,7 +1,7 @@
 """Fisher information of an exposure: how well the parameters of all its sources can be fitted.
 
 The information scales with the exposure time, since the counts of sources, sky and dark
-current all do and no other noise is assumed.
+current all do and no other noise is assumed. A dead time of the pixels lowers it.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     F_ab = sum over pixels of (d lambda / d a) (d lambda / d b) / lambda for Poisson counts of
     expectation lambda, and the covariance of an efficient estimator is its inverse (Cramer
     1946, Mathematical Methods of Statistics, 32.3; Kay 1993, Fundamentals of Statistical
-    Signal Processing, 3.7).
+    Signal Processing, 3.7). Where pixels have a dead time lambda is `Detector.variance` of it.
     """
     arrays, rates = sources_and_rates(sources, observation)
     sky = observation.background_rate
@@ -98,7 +98,8 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
     scale = np.repeat(rates, counts)
     scale[first[:-1]] = 1.0
-    information = joint_information(parts, scale, expected, first)
+    detector = observation.detector
+    information = joint_information(parts, scale, detector.variance(expected), first)
     values, flux_correlation = _invert(information, first, arrays)
     variance = np.full((len(arrays), PARAMETERS), np.nan)
     for i, count in enumerate(counts):
@@ -106,7 +107,7 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     own = [
         np.zeros((count, count))
         if part is None
-        else own_information(part, scale[start : start + count], sky, DARKEST)
+        else own_information(part, scale[start : start + count], sky, DARKEST, detector)
         for part, start, count in zip(parts, first[:-1], counts, strict=True)
     ]
     return Covariance(arrays, rates, rate, variance, _alone(own), flux_correlation)

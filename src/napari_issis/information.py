@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from .detector import Detector
 from .render.derivatives import Derivatives
 from .render.small_products import square
 
@@ -29,7 +30,7 @@ def joint_information(
     scale : ndarray, shape (m,)
         What makes them derivatives of the count rate by the m parameters.
     expected : ndarray, shape (ny, nx)
-        Count rate of sources and sky, cps per pixel.
+        Count rate of sources and sky, cps per pixel: the variance of Poisson counts in 1 s.
     first : ndarray, shape (n + 1,)
         Each source's first parameter, and m.
 
@@ -88,7 +89,9 @@ def _tiles(parts: Sequence[Derivatives | None]) -> dict[tuple[int, int], list[in
     return tiles
 
 
-def own_information(part: Derivatives, scale: Array, sky: float, darkest: float) -> Array:
+def own_information(
+    part: Derivatives, scale: Array, sky: float, darkest: float, detector: Detector
+) -> Array:
     """Information on the parameters of one source alone on the sky, shape (3 or 6, 3 or 6).
 
     Its pixels are taken as no darker than ``darkest`` of the brightest one.
@@ -98,6 +101,6 @@ def own_information(part: Derivatives, scale: Array, sky: float, darkest: float)
     brightest = float(expected.max())
     if not brightest > 0:
         return np.zeros((len(images), len(images)))
-    weighted = images / np.maximum(expected, darkest * brightest)
+    weighted = images / detector.variance(np.maximum(expected, darkest * brightest))
     result: Array = (weighted @ images.T) * scale * scale[:, None]
     return result
