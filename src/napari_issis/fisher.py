@@ -100,16 +100,18 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     scale[first[:-1]] = 1.0
     detector = observation.detector
     information = joint_information(parts, scale, detector.variance(expected), first)
-    values, flux_correlation = _invert(information, first, arrays)
-    variance = np.full((len(arrays), PARAMETERS), np.nan)
-    for i, count in enumerate(counts):
-        variance[i, :count] = values[first[i] : first[i + 1]]
     own = [
         np.zeros((count, count))
         if part is None
         else own_information(part, scale[start : start + count], sky, DARKEST, detector)
         for part, start, count in zip(parts, first[:-1], counts, strict=True)
     ]
+    # the largest arrays of all
+    del parts
+    values, flux_correlation = _invert(information, first, arrays)
+    variance = np.full((len(arrays), PARAMETERS), np.nan)
+    for i, count in enumerate(counts):
+        variance[i, :count] = values[first[i] : first[i + 1]]
     return Covariance(arrays, rates, rate, variance, _alone(own), flux_correlation)
 
 

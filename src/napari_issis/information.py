@@ -40,52 +40,47 @@ def joint_information(
         F_ab = sum over pixels of (d lambda / d a) (d lambda / d b) / lambda, for 1 s.
     """
     root = np.sqrt(np.divide(1.0, expected, out=np.zeros_like(expected), where=expected > 0))
-    tiles = _tiles(parts)
-    most = max(
-        (sum(first[i + 1] - first[i] for i in members) for members in tiles.values()), default=0
-    )
-    room = np.empty(most * TILE * TILE)
-    rows, columns, data = [], [], []
-    for (top, left), members in tiles.items():
-        weight = root[top : top + TILE, left : left + TILE]
-        ids = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
-        stack = room[: ids.size * weight.size].reshape(ids.size, *weight.shape)
-        stack.fill(0.0)
-        at = 0
-        for i in members:
-            part = parts[i]
-            assert part is not None
-            y, x = part.window
-            y0, y1 = max(y.start, top), min(y.stop, top + TILE)
-            x0, x1 = max(x.start, left), min(x.stop, left + TILE)
-            inside = slice(y0 - top, y1 - top), slice(x0 - left, x1 - left)
-            own = part.images[:, y0 - y.start : y1 - y.start, x0 - x.start : x1 - x.start]
-            np.multiply(own, weight[inside], out=stack[(slice(at, at + len(own)), *inside)])
-            at += len(own)
-        product = square(stack.reshape(ids.size, -1))
-        product *= scale[ids]
-        product *= scale[ids][:, None]
-        rows.append(np.repeat(ids, ids.size))
-        columns.append(np.tile(ids, ids.size))
-        data.append(product.ravel())
     m = int(first[-1])
-    if not data:
-        return csr_array((m, m))
-    indices = np.concatenate(rows), np.concatenate(columns)
-    joined = coo_array((np.concatenate(data), indices), shape=(m, m)).tocsr()
-    joined.sum_duplicates()
+    joined = csr_array((m, m))
+    for top, tiles in _tiles(parts).items():
+        rows, columns, data = [], [], []
+        for left, members in tiles.items():
+            weight = root[top : top + TILE, left : left + TILE]
+            ids = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
+            stack = np.zeros((ids.size, *weight.shape))
+            at = 0
+            for i in members:
+                part = parts[i]
+                assert part is not None
+                y, x = part.window
+                y0, y1 = max(y.start, top), min(y.stop, top + TILE)
+                x0, x1 = max(x.start, left), min(x.stop, left + TILE)
+                inside = slice(y0 - top, y1 - top), slice(x0 - left, x1 - left)
+                own = part.images[:, y0 - y.start : y1 - y.start, x0 - x.start : x1 - x.start]
+                np.multiply(own, weight[inside], out=stack[(slice(at, at + len(own)), *inside)])
+                at += len(own)
+            product = square(stack.reshape(ids.size, -1))
+            product *= scale[ids]
+            product *= scale[ids][:, None]
+            short = ids.astype(np.int32)
+            rows.append(np.repeat(short, short.size))
+            columns.append(np.tile(short, short.size))
+            data.append(product.ravel())
+        indices = np.concatenate(rows), np.concatenate(columns)
+        # neighbouring tiles hold much the same pairs: only their sum is kept
+        joined = joined + coo_array((np.concatenate(data), indices), shape=(m, m)).tocsr()
     return joined
 
 
-def _tiles(parts: Sequence[Derivatives | None]) -> dict[tuple[int, int], list[int]]:
-    """First row and column of each tile, and the sources whose windows reach into it."""
-    tiles: dict[tuple[int, int], list[int]] = {}
+def _tiles(parts: Sequence[Derivatives | None]) -> dict[int, dict[int, list[int]]]:
+    """By first row and first column of each tile, the sources whose windows reach into it."""
+    tiles: dict[int, dict[int, list[int]]] = {}
     for i, part in enumerate(parts):
         if part is not None:
             y, x = part.window
             for top in range(y.start // TILE * TILE, y.stop, TILE):
                 for left in range(x.start // TILE * TILE, x.stop, TILE):
-                    tiles.setdefault((top, left), []).append(i)
+                    tiles.setdefault(top, {}).setdefault(left, []).append(i)
     return tiles
 
 
