@@ -6,6 +6,7 @@ current all do and no other noise is assumed. A dead time of the pixels lowers i
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from .exposure import noise_ready_rate
 from .information import joint_information, own_information
 from .observation import Observation
-from .render.derivatives import derivatives
+from .render.derivatives import Derivatives, derivatives
 from .render.optics import Optics
 from .source_rates import sources_and_rates
 from .sources import IMAGE, SourceArrays
@@ -91,7 +92,6 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     rate, _ = noise_ready_rate(sources, observation)
     optics = Optics(observation.effective_psf, observation.pixel_scale)
     level, share = _levels(optics, arrays, rates, sky)
-    parts = derivatives(optics, arrays, level, share, observation.shape)
     expected = rate + sky
     expected = np.maximum(expected, DARKEST * float(expected.max(initial=0.0)))
     counts = np.where(np.isin(arrays.kind, ("point", IMAGE)), 3, PARAMETERS)
@@ -99,15 +99,14 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     scale = np.repeat(rates, counts)
     scale[first[:-1]] = 1.0
     detector = observation.detector
-    information = joint_information(parts, scale, detector.variance(expected), first)
-    own = [
-        np.zeros((count, count))
-        if part is None
-        else own_information(part, scale[start : start + count], sky, DARKEST, detector)
-        for part, start, count in zip(parts, first[:-1], counts, strict=True)
-    ]
-    # the largest arrays of all
-    del parts
+    own = [np.zeros((count, count)) for count in counts]
+
+    def seen() -> Iterator[tuple[int, Derivatives]]:
+        for i, part in derivatives(optics, arrays, level, share, observation.shape):
+            own[i] = own_information(part, scale[first[i] : first[i + 1]], sky, DARKEST, detector)
+            yield i, part
+
+    information = joint_information(seen(), scale, detector.variance(expected), first)
     values, flux_correlation = _invert(information, first, arrays)
     variance = np.full((len(arrays), PARAMETERS), np.nan)
     for i, count in enumerate(counts):

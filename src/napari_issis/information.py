@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +19,15 @@ TILE = 32
 
 
 def joint_information(
-    parts: Sequence[Derivatives | None], scale: Array, expected: Array, first: NDArray[np.intp]
+    parts: Iterable[tuple[int, Derivatives]], scale: Array, expected: Array, first: NDArray[np.intp]
 ) -> csr_array:
     """Sum the information over all pixels, those of a tile of the frame at once.
 
     Parameters
     ----------
-    parts : sequence of (Derivatives or None), of length n
-        Derivatives of the sources' images of 1 cps; None for those out of sight.
+    parts : iterable of (int, Derivatives)
+        Sources and derivatives of their images of 1 cps; first rows of windows never fall. Each
+        is forgotten when the rows of its window are done.
     scale : ndarray, shape (m,)
         What makes them derivatives of the count rate by the m parameters.
     expected : ndarray, shape (ny, nx)
@@ -42,16 +43,15 @@ def joint_information(
     root = np.sqrt(np.divide(1.0, expected, out=np.zeros_like(expected), where=expected > 0))
     m = int(first[-1])
     joined = csr_array((m, m))
-    for top, tiles in _tiles(parts).items():
+    for top, held in _rows_of_tiles(parts):
         rows, columns, data = [], [], []
-        for left, members in tiles.items():
+        for left, members in _tiles(held).items():
             weight = root[top : top + TILE, left : left + TILE]
             ids = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
             stack = np.zeros((ids.size, *weight.shape))
             at = 0
             for i in members:
-                part = parts[i]
-                assert part is not None
+                part = held[i]
                 y, x = part.window
                 y0, y1 = max(y.start, top), min(y.stop, top + TILE)
                 x0, x1 = max(x.start, left), min(x.stop, left + TILE)
@@ -72,15 +72,31 @@ def joint_information(
     return joined
 
 
-def _tiles(parts: Sequence[Derivatives | None]) -> dict[int, dict[int, list[int]]]:
-    """By first row and first column of each tile, the sources whose windows reach into it."""
-    tiles: dict[int, dict[int, list[int]]] = {}
-    for i, part in enumerate(parts):
-        if part is not None:
-            y, x = part.window
-            for top in range(y.start // TILE * TILE, y.stop, TILE):
-                for left in range(x.start // TILE * TILE, x.stop, TILE):
-                    tiles.setdefault(top, {}).setdefault(left, []).append(i)
+def _rows_of_tiles(
+    parts: Iterable[tuple[int, Derivatives]],
+) -> Iterator[tuple[int, dict[int, Derivatives]]]:
+    """First row of each row of tiles, and the sources whose windows reach into it."""
+    waiting = iter(parts)
+    ahead = next(waiting, None)
+    held: dict[int, Derivatives] = {}
+    top = 0
+    while held or ahead is not None:
+        while ahead is not None and ahead[1].window[0].start < top + TILE:
+            held[ahead[0]] = ahead[1]
+            ahead = next(waiting, None)
+        if held:
+            yield top, held
+        top += TILE
+        held = {i: part for i, part in held.items() if part.window[0].stop > top}
+
+
+def _tiles(held: dict[int, Derivatives]) -> dict[int, list[int]]:
+    """By first column of each tile of a row, the sources whose windows reach into it."""
+    tiles: dict[int, list[int]] = {}
+    for i, part in held.items():
+        x = part.window[1]
+        for left in range(x.start // TILE * TILE, x.stop, TILE):
+            tiles.setdefault(left, []).append(i)
     return tiles
 
 

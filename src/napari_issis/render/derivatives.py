@@ -10,6 +10,7 @@ edges of two windows would tell them apart.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -90,8 +91,8 @@ class _Taper:
 
 def derivatives(
     optics: Optics, sources: SourceArrays, level: Array, share: float, shape: tuple[int, int]
-) -> list[Derivatives | None]:
-    """Images of sources of 1 cps and their derivatives; None where a window misses the frame.
+) -> Iterator[tuple[int, Derivatives]]:
+    """Images of sources of 1 cps and their derivatives, from the frame's first row on.
 
     Parameters
     ----------
@@ -105,40 +106,71 @@ def derivatives(
         ...and a point source is above this share of its peak, whichever its rate.
     shape : (int, int)
         Frame in pixels.
+
+    Yields
+    ------
+    row : int
+        Of the source table; sources whose windows miss the frame are left out.
+    derivatives : Derivatives
+        The first rows of their windows never fall.
     """
-    result: list[Derivatives | None] = [None] * len(sources)
     wing = _reach(optics, share / optics.point_area)
-    points = np.zeros(0, dtype=np.intp)
-    if optics.radial:
-        taper = _Taper(wing)
-        points = np.flatnonzero(sources.kind == "point")
-        near_y = np.abs(sources.y[points] - (shape[0] - 1) / 2) < shape[0] / 2 + taper.half + 1
-        near_x = np.abs(sources.x[points] - (shape[1] - 1) / 2) < shape[1] / 2 + taper.half + 1
-        seen = points[near_y & near_x]
-        for first in range(0, seen.size, CHUNK):
-            rows = seen[first : first + CHUNK]
-            images = _points(optics, taper, sources.y[rows], sources.x[rows])
-            for i, own in zip(rows, images, strict=True):
-                result[i] = _inside(shape, sources, i, (taper, taper), own)
-    for i in np.setdiff1d(np.arange(len(sources)), points):
-        one = sources.take(slice(i, i + 1))
-        tapers = _tapers(one, wing, float(level[i]), shape)
+    taper = _Taper(wing)
+    tapers: dict[int, tuple[_Taper, _Taper] | None] = {}
+    start = np.rint(sources.y) - taper.half
+    quick = (sources.kind == "point") & optics.radial
+    for i in np.flatnonzero(~quick):
+        ends = _tapers(sources.take(slice(i, i + 1)), wing, float(level[i]), shape)
+        tapers[i] = ends
+        start[i] = 0.0 if ends is None else round(float(sources.y[i])) - ends[0].half
+    order = np.argsort(np.maximum(start, 0.0), kind="stable")
+    points = order[quick[order]]
+    near_y = np.abs(sources.y[points] - (shape[0] - 1) / 2) < shape[0] / 2 + taper.half + 1
+    near_x = np.abs(sources.x[points] - (shape[1] - 1) / 2) < shape[1] / 2 + taper.half + 1
+    stars = _stars(optics, taper, sources, points[near_y & near_x], shape)
+    star = next(stars, None)
+    for i in order:
+        part: Derivatives | None = None
+        if not quick[i]:
+            part = _any(optics, sources.take(slice(i, i + 1)), tapers[i], shape)
+        elif star is not None and star[0] == i:
+            part, star = star[1], next(stars, None)
+        if part is not None:
+            yield int(i), part
+
+
+def _stars(
+    optics: Optics,
+    taper: _Taper,
+    sources: SourceArrays,
+    points: NDArray[np.intp],
+    shape: tuple[int, int],
+) -> Iterator[tuple[int, Derivatives | None]]:
+    for first in range(0, points.size, CHUNK):
+        rows = points[first : first + CHUNK]
+        images = _points(optics, taper, sources.y[rows], sources.x[rows])
+        for i, own in zip(rows, images, strict=True):
+            yield int(i), _inside(shape, sources, i, (taper, taper), own)
+
+
+def _any(
+    optics: Optics,
+    one: SourceArrays,
+    tapers: tuple[_Taper, _Taper] | None,
+    shape: tuple[int, int],
+) -> Derivatives | None:
+    """Return derivatives of a source of any kind; None where its window misses the frame."""
+    if tapers is None:
         whole = slice(0, shape[0]), slice(0, shape[1])
-        if tapers is None:
-            broad = _broad(optics, one, None, whole)
-            result[i] = Derivatives(
-                whole, wide_images(optics, one, shape) if broad is None else broad
-            )
-            continue
-        half = tapers[0].half, tapers[1].half
-        row, column = round(float(one.y[0])) - half[0], round(float(one.x[0])) - half[1]
-        window = overlap(shape, row, column, (2 * half[0] + 1, 2 * half[1] + 1))
-        if window is not None:
-            broad = _broad(optics, one, tapers, window) if max(half) > BROAD else None
-            result[i] = Derivatives(
-                window, _images(optics, one, tapers, window) if broad is None else broad
-            )
-    return result
+        broad = _broad(optics, one, None, whole)
+        return Derivatives(whole, wide_images(optics, one, shape) if broad is None else broad)
+    half = tapers[0].half, tapers[1].half
+    row, column = round(float(one.y[0])) - half[0], round(float(one.x[0])) - half[1]
+    window = overlap(shape, row, column, (2 * half[0] + 1, 2 * half[1] + 1))
+    if window is None:
+        return None
+    broad = _broad(optics, one, tapers, window) if max(half) > BROAD else None
+    return Derivatives(window, _images(optics, one, tapers, window) if broad is None else broad)
 
 
 def _broad(
