@@ -119,7 +119,7 @@ def derivatives(
     tapers: dict[int, tuple[_Taper, _Taper] | None] = {}
     start = np.rint(sources.y) - taper.half
     quick = (sources.kind == "point") & optics.radial
-    for i in np.flatnonzero(~quick):
+    for i in np.flatnonzero(~quick).tolist():
         ends = _tapers(sources.take(slice(i, i + 1)), wing, float(level[i]), shape)
         tapers[i] = ends
         start[i] = 0.0 if ends is None else round(float(sources.y[i])) - ends[0].half
@@ -129,14 +129,14 @@ def derivatives(
     near_x = np.abs(sources.x[points] - (shape[1] - 1) / 2) < shape[1] / 2 + taper.half + 1
     stars = _stars(optics, taper, sources, points[near_y & near_x], shape)
     star = next(stars, None)
-    for i in order:
+    for i in order.tolist():
         part: Derivatives | None = None
         if not quick[i]:
             part = _any(optics, sources.take(slice(i, i + 1)), tapers[i], shape)
         elif star is not None and star[0] == i:
             part, star = star[1], next(stars, None)
         if part is not None:
-            yield int(i), part
+            yield i, part
 
 
 def _stars(
