@@ -188,6 +188,62 @@ def test_the_correction_is_the_encircled_energy():
     assert 1 / row["aperture_correction"] == pytest.approx(share, rel=1e-3)
 
 
+def test_the_corrections_of_many_stars():
+    """Catches shares of another star's place, and light of the series that wraps around.
+
+    The shares are those of closed-form pixels in photutils' own apertures, one after the other.
+    """
+    from photutils.aperture import CircularAperture
+
+    rng = np.random.default_rng(4)
+    places = rng.uniform(12, 50, (40, 2))
+    # halves of a pixel round either way
+    places[:3] = [(20.5, 30.5), (21.5, 31.0), (22.0, 31.5)]
+    galaxy = ni.source("exponential", 30, 30, 3e-16, 4, 0.5, 20)
+    stars = [ni.source("point", x, y, 1e-16) for x, y in places]
+    scene = vstack([*stars[:7], galaxy, *stars[7:]])
+    exposure = ni.simulate(scene, observation())
+    rows = np.delete(rng.permutation(41), 5)
+    table = ni.aperture_photometry(exposure, radius=3.3, rows=rows)
+    np.testing.assert_array_equal(table["row"], rows)
+    points = table[table["kind"] == "point"]
+    for row in points:
+        x, y = row["x"].value, row["y"].value
+        own = CircularAperture((x, y), 3.3).do_photometry(star_on_pixels(x, y))[0][0]
+        assert 1 / row["aperture_correction"] == pytest.approx(own, rel=1e-6)
+    one = ni.aperture_photometry(exposure, radius=3.3, rows=7)[0]
+    (same,) = table[table["row"] == 7]
+    for name in ("aperture_counts", "net_counts", "true_counts", "counts", "bias"):
+        assert same[name].value == pytest.approx(one[name].value, rel=1e-12)
+
+
+@pytest.mark.parametrize("sky", ["mean", "median"])
+def test_annuli_at_once_are_those_one_by_one(sky):
+    """Catches a sky of another source's annulus, and clipping over several of them."""
+    from astropy.stats import sigma_clip
+    from photutils.aperture import EllipticalAnnulus
+
+    scene = vstack(
+        [ni.random_sources("point", 6, shape=SHAPE), ni.source("point", 900, 900, 1e-16)]
+    )
+    for x, y, pa in ((20, 30, 40), (44, 20, 0), (63, 40, 90)):
+        scene = vstack([scene, ni.source("gaussian", x, y, 3e-16, 3, 0.6, pa)])
+    exposure = ni.simulate(scene, observation(exposure=1e6), seed=3)
+    table = ni.aperture_photometry(exposure, radius=3, sky=sky)
+    for row in table:
+        x, y, a, b = (row[name].value for name in ("x", "y", "a", "b"))
+        ring = EllipticalAnnulus(
+            (x, y), 2 * a, 3 * a, 3 * b, b_in=2 * b, theta=np.radians(row["pa"].value + 90)
+        )
+        values = ring.to_mask(method="center").get_values(exposure.counts)
+        if not values.size:
+            assert row["sky"].value == pytest.approx(exposure.background)
+            continue
+        kept = sigma_clip(values, sigma=3, maxiters=None, masked=False)
+        level = kept.mean() if sky == "mean" else np.median(kept)
+        assert row["sky"].value == pytest.approx(level, rel=1e-12)
+
+
 def test_a_source_that_is_an_image():
     """Catches a kind that apertures do not know: alone it has no bias."""
     y, x = np.mgrid[-9:10, -9:10]

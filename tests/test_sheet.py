@@ -216,6 +216,42 @@ def test_a_source_that_is_an_image_is_read_from_the_saved_exposure(tmp_path, mon
     assert np.array_equal(made["exposures"][0].counts, exposure.counts)
 
 
+@pytest.mark.parametrize("samples", [9, 500])
+@pytest.mark.parametrize("left", ["gone", "changed"])
+def test_spectra_from_files_are_on_the_page_or_in_the_saved_exposure(
+    samples, left, tmp_path, monkeypatch
+):
+    """Catches commands that need the author's file, or take another of that name for it."""
+    there, here = tmp_path / "author", tmp_path / "reader"
+    there.mkdir()
+    here.mkdir()
+    wavelength = np.linspace(1000, 4000, samples)
+    flux = 1e-17 * (1 + np.sin(wavelength / 300) ** 2) / 3
+    own = there / "my sed.csv"
+    own.write_text(
+        "wavelength_A,flux\n" + "".join(f"{w},{f}\n" for w, f in zip(wavelength, flux, strict=True))
+    )
+    scene = SCENE.copy()
+    scene["spectrum"] = [f'table("{own}", z=0.1, at=2600)', "", f'table("{own}", at=2100)']
+    page = sheet(tmp_path / "x.html", scene)
+    exposure = ni.simulate(scene, ONE)
+    flat = ni.simulate(SCENE, ONE)
+    assert not np.array_equal(exposure.counts, flat.counts)
+    monkeypatch.chdir(here)
+    if samples > 64:
+        assert "500 samples" in " ".join(page.texts)
+        exposure.write("NUV.fits")
+    else:
+        assert str(own) not in page.code
+    if left == "gone":
+        own.unlink()
+    else:
+        own.write_text("wavelength_A,flux\n1000,1\n4000,2\n")
+    made = {}
+    exec(compile(page.code, "<sheet>", "exec"), made)
+    assert np.array_equal(made["exposures"][0].counts, exposure.counts)
+
+
 def test_the_same_input_gives_the_same_bytes(tmp_path):
     for name in ("a.html", "b.html"):
         sheet(tmp_path / name, seed=2)

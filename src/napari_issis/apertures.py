@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable, Table
+from astropy.table import QTable
 from numpy.typing import NDArray
 
+from .aperture_masks import Apertures, own_shares, ring_levels, sums
 from .exposure import Exposure
-from .observation import Observation
-from .render import count_rate
 from .source_rates import sources_and_rates
 from .sources import SourceArrays
 
@@ -24,17 +22,6 @@ SKIES = ("known", "mean", "median")
 LARGEST = 3000.0
 # Standard error of the median of a normal distribution over that of the mean.
 MEDIAN_ERROR = np.sqrt(np.pi / 2)
-
-
-@dataclass(frozen=True, eq=False)
-class _Apertures:
-    """Elliptical apertures: centres, semi-axes (pixels) and angles from +x to +y (radians)."""
-
-    x: Array
-    y: Array
-    a: Array
-    b: Array
-    theta: Array
 
 
 def aperture_photometry(
@@ -115,19 +102,21 @@ def aperture_photometry(
             f"row {chosen[i]}: its aperture or annulus reaches {reach[i]:.4g} pixels; at most "
             f"{LARGEST:g} can be. Choose a smaller scale or annulus, or leave it out by rows."
         )
-    area, complete = _areas(apertures, observation.shape)
-    shares = [own_share(exposure.sources[i : i + 1], size, scale, observation) for i in chosen]
-    share = np.array(shares)
+    masks = apertures.masks()
+    area, complete = _areas(apertures, masks, observation.shape)
+    share = own_shares(exposure.sources[chosen], arrays, apertures, masks, observation)
+
+    rings = [] if sky == "known" else apertures.rings(*annulus)
 
     def measured(image: Array) -> tuple[Array, Array, Array]:
-        level, error = np.full(len(area), exposure.background), np.zeros(len(area))
-        if sky != "known":
-            for i in range(len(area)):
-                values = _annulus_values(image, apertures, i, annulus, sigma_clip)
-                if values.size:
-                    level[i] = np.mean(values) if sky == "mean" else np.median(values)
-                    error[i] = np.sqrt(max(float(np.mean(values)), 0.0) / values.size)
-        return _sums(image, apertures), level, error * (MEDIAN_ERROR if sky == "median" else 1.0)
+        total = sums(image, masks)
+        if sky == "known":
+            return total, np.full(len(area), exposure.background), np.zeros(len(area))
+        level, mean, count = ring_levels(image, rings, sigma_clip, sky == "median")
+        seen = count > 0
+        error = np.sqrt(_ratio(np.where(seen, np.maximum(mean, 0.0), 0.0), count.astype(float)))
+        error *= MEDIAN_ERROR if sky == "median" else 1.0
+        return total, np.where(seen, level, exposure.background), error
 
     counts, level, level_error = measured(exposure.counts.astype(np.float64))
     net = counts - area * level
@@ -169,89 +158,20 @@ def aperture_photometry(
     )
 
 
-def own_share(one: Table, radius: float, scale: float, observation: Observation) -> float:
-    """Share of a source's light that its aperture holds, on pixels, without noise.
-
-    Parameters
-    ----------
-    one : astropy.table.Table
-        A source table of one row; the source's place within its pixel counts.
-    radius, scale : float
-        The aperture, see `aperture_photometry`; ``radius`` in pixels.
-    observation : Observation
-        The instrument set-up.
-    """
-    arrays, _ = sources_and_rates(one, observation)
-    apertures = _apertures(arrays, radius, scale)
-    half = int(np.ceil(apertures.a[0])) + 1
-    x, y = (half + v - np.rint(v) for v in (arrays.x, arrays.y))
-    flux = 1e-15
-    alone = Table(one)
-    # with a flat spectrum and open filters, whose rate is known
-    alone.keep_columns([name for name in alone.colnames if name != "spectrum"])
-    alone["x"], alone["y"], alone["flux"] = x, y, np.array([flux])
-    frame = observation.replace(
-        shape=(2 * half + 1, 2 * half + 1),
-        filters=("open", "open"),
-        psf=observation.effective_psf,
-    )
-    sums = _sums(count_rate(alone, frame), replace(apertures, x=x, y=y))
-    return float(sums[0] / (flux * frame.cps_per_flux))
-
-
-def _apertures(arrays: SourceArrays, radius: float, scale: float) -> _Apertures:
+def _apertures(arrays: SourceArrays, radius: float, scale: float) -> Apertures:
     major = scale * arrays.r_half
     minor = major * (1 - arrays.ellipticity)
     # pa counts from +y, an angle of photutils from +x
     theta = np.radians(arrays.pa + 90.0)
-    return _Apertures(arrays.x, arrays.y, np.hypot(major, radius), np.hypot(minor, radius), theta)
+    return Apertures(arrays.x, arrays.y, np.hypot(major, radius), np.hypot(minor, radius), theta)
 
 
-def _sums(image: Array, apertures: _Apertures) -> Array:
-    """Sum of an image in each aperture; 0 outside the frame."""
-    from photutils.aperture import EllipticalAperture
-
-    sums = np.zeros(len(apertures.x))
-    for i, (x, y, a, b, theta) in enumerate(_each(apertures)):
-        mask = EllipticalAperture((x, y), a, b, theta=theta).to_mask(method="exact")
-        cutout = mask.cutout(image)
-        sums[i] = 0.0 if cutout is None else float((cutout * mask.data).sum())
-    return sums
-
-
-def _areas(apertures: _Apertures, shape: tuple[int, int]) -> tuple[Array, NDArray[np.bool_]]:
+def _areas(
+    apertures: Apertures, masks: list[Any], shape: tuple[int, int]
+) -> tuple[Array, NDArray[np.bool_]]:
     """Area of each aperture within the frame, and whether that is all of it."""
-    area = _sums(np.ones(shape), apertures)
+    area = sums(np.ones(shape), masks)
     return area, area > np.pi * apertures.a * apertures.b * (1 - 1e-6)
-
-
-def _annulus_values(
-    image: Array, apertures: _Apertures, i: int, annulus: tuple[float, float], clip: float | None
-) -> Array:
-    """Pixels whose centres lie in the annulus of an aperture, the clipped ones left out."""
-    from astropy.stats import sigma_clip as clipped
-    from photutils.aperture import EllipticalAnnulus
-
-    inner, outer = annulus
-    a, b = apertures.a[i], apertures.b[i]
-    ring = EllipticalAnnulus(
-        (apertures.x[i], apertures.y[i]),
-        inner * a,
-        outer * a,
-        outer * b,
-        b_in=inner * b,
-        theta=apertures.theta[i],
-    )
-    values: Array = np.asarray(ring.to_mask(method="center").get_values(image), dtype=np.float64)
-    if clip is not None and values.size:
-        values = np.asarray(clipped(values, sigma=clip, maxiters=None, masked=False))
-    return values
-
-
-def _each(apertures: _Apertures) -> Any:
-    return zip(
-        *(getattr(apertures, name).tolist() for name in ("x", "y", "a", "b", "theta")), strict=True
-    )
 
 
 def _ratio(above: Array, below: Array) -> Array:

@@ -100,6 +100,23 @@ class Detector:
         seeing = 1 - rate * self.dead_time
         return np.divide(rate, seeing, out=np.full_like(rate, np.inf), where=seeing > 0)
 
+    def variance(self, rate: Array) -> Array:
+        """Return the variance, for 1 s, of the best estimate of a true rate, any shape.
+
+        Parameters
+        ----------
+        rate : ndarray
+            True rate in cps per pixel.
+
+        Notes
+        -----
+        n (1 + n tau): that of the detected counts, m T / (1 + n tau)^2, over the square of what
+        they grow by with n T, 1 / (1 + n tau)^2. It is 1 / (information on n of the waiting
+        times, of which m T are seen, each with the information 1 / n^2), for exposures much
+        longer than tau and 1 / n.
+        """
+        return rate * (1 + rate * self.dead_time) if self.dead_time else rate
+
     def stored(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the numbers that the memory holds after these counts, any shape."""
         return counts % WORD if self.rollover else counts

@@ -1,11 +1,12 @@
 """Fisher information of an exposure: how well the parameters of all its sources can be fitted.
 
 The information scales with the exposure time, since the counts of sources, sky and dark
-current all do and no other noise is assumed.
+current all do and no other noise is assumed. A dead time of the pixels lowers it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from .exposure import noise_ready_rate
 from .information import joint_information, own_information
 from .observation import Observation
-from .render.derivatives import derivatives
+from .render.derivatives import Derivatives, derivatives
 from .render.optics import Optics
 from .source_rates import sources_and_rates
 from .sources import IMAGE, SourceArrays
@@ -84,31 +85,32 @@ def covariance(sources: Table, observation: Observation) -> Covariance:
     F_ab = sum over pixels of (d lambda / d a) (d lambda / d b) / lambda for Poisson counts of
     expectation lambda, and the covariance of an efficient estimator is its inverse (Cramer
     1946, Mathematical Methods of Statistics, 32.3; Kay 1993, Fundamentals of Statistical
-    Signal Processing, 3.7).
+    Signal Processing, 3.7). Where pixels have a dead time lambda is `Detector.variance` of it.
     """
     arrays, rates = sources_and_rates(sources, observation)
     sky = observation.background_rate
     rate, _ = noise_ready_rate(sources, observation)
     optics = Optics(observation.effective_psf, observation.pixel_scale)
     level, share = _levels(optics, arrays, rates, sky)
-    parts = derivatives(optics, arrays, level, share, observation.shape)
     expected = rate + sky
     expected = np.maximum(expected, DARKEST * float(expected.max(initial=0.0)))
     counts = np.where(np.isin(arrays.kind, ("point", IMAGE)), 3, PARAMETERS)
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
     scale = np.repeat(rates, counts)
     scale[first[:-1]] = 1.0
-    information = joint_information(parts, scale, expected, first)
+    detector = observation.detector
+    own = [np.zeros((count, count)) for count in counts]
+
+    def seen() -> Iterator[tuple[int, Derivatives]]:
+        for i, part in derivatives(optics, arrays, level, share, observation.shape):
+            own[i] = own_information(part, scale[first[i] : first[i + 1]], sky, DARKEST, detector)
+            yield i, part
+
+    information = joint_information(seen(), scale, detector.variance(expected), first)
     values, flux_correlation = _invert(information, first, arrays)
     variance = np.full((len(arrays), PARAMETERS), np.nan)
     for i, count in enumerate(counts):
         variance[i, :count] = values[first[i] : first[i + 1]]
-    own = [
-        np.zeros((count, count))
-        if part is None
-        else own_information(part, scale[start : start + count], sky, DARKEST)
-        for part, start, count in zip(parts, first[:-1], counts, strict=True)
-    ]
     return Covariance(arrays, rates, rate, variance, _alone(own), flux_correlation)
 
 

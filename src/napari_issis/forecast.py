@@ -45,7 +45,8 @@ def forecast(sources: Table, observation: Observation | None = None) -> QTable:
     Cramer-Rao bounds of the Poisson likelihood, jointly over all sources, see
     `napari_issis.fisher`. They hold for a maximum-likelihood fit with the known PSF, sky and
     Sersic index, of sources that are bright enough: a fit of faint or blended ones scatters
-    more and is biased. The detector is taken as linear.
+    more and is biased. What coincidence loss takes away, if the detector has a dead time, is
+    counted; a rollover of its memory is taken as undone.
     """
     observation = Observation() if observation is None else observation
     result = covariance(sources, observation)

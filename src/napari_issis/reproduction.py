@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import astropy.units as u
 import numpy as np
 from astropy.coordinates import SkyCoord
 from astropy.table import Table
+from numpy.typing import NDArray
 
 from .detector import Detector
 from .filters import Filter
@@ -19,10 +23,12 @@ from .observation import Observation
 from .psf import GaussianPSF, MoffatPSF, TelescopePSF
 from .sky import SKIES, PaperSky, Sky
 from .sources import COLUMNS, FLUX_UNIT, IMAGE, spectrum_texts
+from .spectra import table_file, with_table_file
+from .spectrum_curves import curve_stamp, read_spectrum_curve
 
 # Units that a plain number of a source table has.
 PLAIN = {"x": u.pix, "y": u.pix, "flux": FLUX_UNIT, "r_half": u.pix, "pa": u.deg}
-# Samples of a filter's curve that are written out.
+# Samples of a curve, of a filter or a spectrum, that are written out.
 LONGEST_CURVE = 64
 
 
@@ -51,7 +57,8 @@ def reproduction_code(
     str
         It defines ``sources``, ``observations`` and ``exposures``. A set-up that cannot be
         written in a few lines, such as a PSF that is an image, is read from the FITS file of
-        its exposure, which has to be saved beside.
+        its exposure, which has to be saved beside; and so are sources that are images, and
+        those with spectra from files of many samples. Spectra of few are written to files.
     """
     body = [*_sources(sources, observations[0].channel), "observations = ["]
     body += [f"    {_observation(one)}" for one in observations]
@@ -69,6 +76,8 @@ def reproduction_code(
     head = ["from math import inf, nan"] if "nan" in text or "inf" in text else []
     if "u." in text:
         head.append("import astropy.units as u")
+    if "Path(" in text:
+        head.append("from pathlib import Path")
     if "SkyCoord(" in text:
         head.append("from astropy.coordinates import SkyCoord")
     head += ["from astropy.table import QTable", "import napari_issis as ni"]
@@ -91,9 +100,39 @@ def unwritten(observation: Observation) -> str | None:
     return None
 
 
-def unwritten_sources(table: Table) -> bool:
-    """Tell whether sources cannot be written as lines of Python, as images cannot."""
-    return IMAGE in table["kind"]
+def unwritten_sources(table: Table) -> str | None:
+    """Name what of sources cannot be written as lines of Python; None if nothing is."""
+    if IMAGE in table["kind"]:
+        return "Sources that are images"
+    for path in spectrum_files(table):
+        samples = _curve(path)[0].size
+        if samples > LONGEST_CURVE:
+            return f"The {samples} samples of the spectrum {path}"
+    return None
+
+
+def spectrum_files(table: Table) -> list[str]:
+    """Files of the spectra of a source table, each once."""
+    spectra = spectrum_texts(table)
+    files = (table_file(str(text)) for text in (() if spectra is None else spectra))
+    return list(dict.fromkeys(path for path in files if path is not None))
+
+
+def _curve(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return read_spectrum_curve(path, curve_stamp(path))
+
+
+def written_name(path: str) -> str:
+    """Name of the file that the commands make of a spectrum's: another for other samples."""
+    wavelength, flux = _curve(path)
+    stem = re.sub(r"[^\w-]", "_", Path(path).stem)
+    return f"{stem}-{zlib.crc32(flux.tobytes(), zlib.crc32(wavelength.tobytes())):08x}.csv"
+
+
+def _file_lines(path: str) -> list[str]:
+    rows = zip(*(column.tolist() for column in _curve(path)), strict=True)
+    lines = [f'    "{wavelength!r},{flux!r}\\n"' for wavelength, flux in rows]
+    return [f"Path({written_name(path)!r}).write_text(", '    "wavelength_A,flux\\n"', *lines, ")"]
 
 
 def _name_of(camera: Instrument) -> str | None:
@@ -106,24 +145,31 @@ def _plain(observation: Observation) -> Observation:
 
 
 def _sources(table: Table, channel: str) -> list[str]:
+    if unwritten_sources(table) is not None:
+        return [f"sources = ni.Exposure.read({channel + '.fits'!r}).sources"]
     names = [name for name in (*COLUMNS, "n") if name in table.colnames]
     columns = [_values(table, name) for name in names]
     spectra = spectrum_texts(table)
     if spectra is not None:
         names.append("spectrum")
-        columns.append([repr(str(text)) for text in spectra])
+        columns.append([repr(_spectrum(str(text))) for text in spectra])
     rows = [f"        ({', '.join(row)})," for row in zip(*columns, strict=True)]
     heading = ", ".join(repr(name) for name in names)
-    if unwritten_sources(table):
-        return [f"sources = ni.Exposure.read({channel + '.fits'!r}).sources"]
     if not rows:
         return ['sources = ni.source("point", 0.0, 0.0)[:0]']
-    lines = ["sources = QTable(", "    rows=[", *rows, "    ],", f"    names=({heading}),", ")"]
+    lines = [line for path in spectrum_files(table) for line in _file_lines(path)]
+    lines += ["sources = QTable(", "    rows=[", *rows, "    ],", f"    names=({heading}),", ")"]
     for name, plain in PLAIN.items():
         unit = getattr(table[name], "unit", None) if name in names else None
         if unit is not None and unit != plain:
             lines.append(f'sources["{name}"] = list(sources["{name}"]) * u.Unit({str(unit)!r})')
     return lines
+
+
+def _spectrum(text: str) -> str:
+    """Text of a spectrum, with the file that the commands write in the place of its own."""
+    path = table_file(text)
+    return text if path is None else with_table_file(text, written_name(path))
 
 
 def _values(table: Table, name: str) -> list[str]:

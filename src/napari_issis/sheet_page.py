@@ -18,7 +18,13 @@ from .fits_light_path import sky_description
 from .observation import Observation
 from .photometry import ab_magnitude
 from .psf import RadialPSF, fwhm
-from .reproduction import reproduction_code, unwritten, unwritten_sources
+from .reproduction import (
+    reproduction_code,
+    spectrum_files,
+    unwritten,
+    unwritten_sources,
+    written_name,
+)
 from .sheet_pictures import image_svg, model_svg
 from .source_counts import expected_counts
 from .source_rates import flux_pivots, sources_and_rates
@@ -325,10 +331,17 @@ def _assumptions(results: Sequence[ChannelResult], added: str) -> list[str]:
     texts += [f"{name}: {camera.filter_note}" for name in curves]
     if added:
         texts.append(f"{added} was added with the same exposure time and its own PSF and sky.")
-    if unwritten_sources(results[0].exposure.sources):
+    table = results[0].exposure.sources
+    missing = unwritten_sources(table)
+    if missing is not None:
         texts.append(
-            "Sources that are images cannot be written on this page: the commands read all "
-            f"sources from {observations[0].channel}.fits, the saved exposure."
+            f"{missing} cannot be written on this page: the commands read all sources from "
+            f"{observations[0].channel}.fits, the saved exposure, which holds them."
+        )
+    elif spectrum_files(table):
+        texts.append(
+            "The commands write the samples of spectra that are tables to files: "
+            f"{', '.join(f'{written_name(path)} ({path})' for path in spectrum_files(table))}."
         )
     for one in observations:
         missing = unwritten(one)
@@ -337,9 +350,6 @@ def _assumptions(results: Sequence[ChannelResult], added: str) -> list[str]:
                 f"{missing} of {one.channel} cannot be written on this page: the commands read "
                 f"it from {one.channel}.fits, the saved exposure."
             )
-    spectra = spectrum_texts(results[0].exposure.sources)
-    if spectra is not None and any("table(" in text for text in spectra):
-        texts.append("Spectra that are tables are read from their files.")
     return texts
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from astropy.table import Table
 from numpy.typing import NDArray
 
+from .exposure import dead_share
 from .observation import Observation
 from .render.images import inverse_noise_area
 from .render.optics import Optics
@@ -41,21 +42,23 @@ def signal_to_noise(sources: Table, observation: Observation) -> Array:
     -------
     ndarray, shape (n,)
         N / sqrt(N + A B), with N the source's counts, B the sky's counts per pixel and A the
-        source's noise-equivalent area. Neighbours are not counted, and of a source near the
-        frame's edge all light is.
+        source's noise-equivalent area; lowered by the dead time of the detector, if it has one.
+        Neighbours are not counted, and of a source near the frame's edge all light is.
 
     Notes
     -----
     King (1983, PASP 95, 163): a fit of the source's known shape in front of a sky gets as much
     noise from the sky as A = 1 / sum(p^2) of its pixels hold, p being the share of its light
-    in each.
+    in each. A dead time tau multiplies the variance V = N + A B by 1 + V tau / (A T), to first
+    order: V / (A T) is the rate of a pixel where the source tells most.
     """
     arrays, rate = sources_and_rates(sources, observation)
     counts = rate * observation.exposure
     optics = Optics(observation.effective_psf, observation.pixel_scale)
     area = noise_areas(optics, arrays)
     sky = observation.background_rate * observation.exposure
-    noise = np.sqrt(counts + area * sky)
+    variance = counts + area * sky
+    noise = np.sqrt(variance * (1 + variance / area * dead_share(observation)))
     return np.divide(counts, noise, out=np.zeros_like(counts), where=noise > 0)
 
 

@@ -10,6 +10,7 @@ edges of two windows would tell them apart.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sources import IMAGE, SourceArrays
+from .broad import Ellipses, broad_images, split
 from .moving import highest_frequency, point_reach, profile_half_sizes
 from .optics import Optics, Transfer
 from .small_products import stack_product
@@ -33,6 +35,12 @@ STEP = 1e-4
 TAIL = 1e-7
 # point sources computed at once
 CHUNK = 32
+# half-size of a window in pixels from which a smooth profile is computed on several meshes
+BROAD = 100
+# shares of a point's peak where the PSF's wings end around a profile's core and on meshes
+CORE_LEVEL, FAR_LEVEL = 1e-6, 1e-7
+# half-size of a core in pixels above which the profile is not computed so
+LARGEST_CORE = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +91,8 @@ class _Taper:
 
 def derivatives(
     optics: Optics, sources: SourceArrays, level: Array, share: float, shape: tuple[int, int]
-) -> list[Derivatives | None]:
-    """Images of sources of 1 cps and their derivatives; None where a window misses the frame.
+) -> Iterator[tuple[int, Derivatives]]:
+    """Images of sources of 1 cps and their derivatives, from the frame's first row on.
 
     Parameters
     ----------
@@ -98,34 +106,109 @@ def derivatives(
         ...and a point source is above this share of its peak, whichever its rate.
     shape : (int, int)
         Frame in pixels.
+
+    Yields
+    ------
+    row : int
+        Of the source table; sources whose windows miss the frame are left out.
+    derivatives : Derivatives
+        The first rows of their windows never fall.
     """
-    result: list[Derivatives | None] = [None] * len(sources)
     wing = _reach(optics, share / optics.point_area)
-    points = np.zeros(0, dtype=np.intp)
-    if optics.radial:
-        taper = _Taper(wing)
-        points = np.flatnonzero(sources.kind == "point")
-        near_y = np.abs(sources.y[points] - (shape[0] - 1) / 2) < shape[0] / 2 + taper.half + 1
-        near_x = np.abs(sources.x[points] - (shape[1] - 1) / 2) < shape[1] / 2 + taper.half + 1
-        seen = points[near_y & near_x]
-        for first in range(0, seen.size, CHUNK):
-            rows = seen[first : first + CHUNK]
-            images = _points(optics, taper, sources.y[rows], sources.x[rows])
-            for i, own in zip(rows, images, strict=True):
-                result[i] = _inside(shape, sources, i, (taper, taper), own)
-    for i in np.setdiff1d(np.arange(len(sources)), points):
-        one = sources.take(slice(i, i + 1))
-        tapers = _tapers(one, wing, float(level[i]), shape)
-        if tapers is None:
-            whole = slice(0, shape[0]), slice(0, shape[1])
-            result[i] = Derivatives(whole, wide_images(optics, one, shape))
-            continue
-        half = tuple(each.half for each in tapers)
-        row, column = round(float(one.y[0])) - half[0], round(float(one.x[0])) - half[1]
-        window = overlap(shape, row, column, (2 * half[0] + 1, 2 * half[1] + 1))
-        if window is not None:
-            result[i] = Derivatives(window, _images(optics, one, tapers, window))
-    return result
+    taper = _Taper(wing)
+    tapers: dict[int, tuple[_Taper, _Taper] | None] = {}
+    start = np.rint(sources.y) - taper.half
+    quick = (sources.kind == "point") & optics.radial
+    for i in np.flatnonzero(~quick).tolist():
+        ends = _tapers(sources.take(slice(i, i + 1)), wing, float(level[i]), shape)
+        tapers[i] = ends
+        start[i] = 0.0 if ends is None else round(float(sources.y[i])) - ends[0].half
+    order = np.argsort(np.maximum(start, 0.0), kind="stable")
+    points = order[quick[order]]
+    near_y = np.abs(sources.y[points] - (shape[0] - 1) / 2) < shape[0] / 2 + taper.half + 1
+    near_x = np.abs(sources.x[points] - (shape[1] - 1) / 2) < shape[1] / 2 + taper.half + 1
+    stars = _stars(optics, taper, sources, points[near_y & near_x], shape)
+    star = next(stars, None)
+    for i in order.tolist():
+        part: Derivatives | None = None
+        if not quick[i]:
+            part = _any(optics, sources.take(slice(i, i + 1)), tapers[i], shape)
+        elif star is not None and star[0] == i:
+            part, star = star[1], next(stars, None)
+        if part is not None:
+            yield i, part
+
+
+def _stars(
+    optics: Optics,
+    taper: _Taper,
+    sources: SourceArrays,
+    points: NDArray[np.intp],
+    shape: tuple[int, int],
+) -> Iterator[tuple[int, Derivatives | None]]:
+    for first in range(0, points.size, CHUNK):
+        rows = points[first : first + CHUNK]
+        images = _points(optics, taper, sources.y[rows], sources.x[rows])
+        for i, own in zip(rows, images, strict=True):
+            yield int(i), _inside(shape, sources, i, (taper, taper), own)
+
+
+def _any(
+    optics: Optics,
+    one: SourceArrays,
+    tapers: tuple[_Taper, _Taper] | None,
+    shape: tuple[int, int],
+) -> Derivatives | None:
+    """Return derivatives of a source of any kind; None where its window misses the frame."""
+    if tapers is None:
+        whole = slice(0, shape[0]), slice(0, shape[1])
+        broad = _broad(optics, one, None, whole)
+        return Derivatives(whole, wide_images(optics, one, shape) if broad is None else broad)
+    half = tapers[0].half, tapers[1].half
+    row, column = round(float(one.y[0])) - half[0], round(float(one.x[0])) - half[1]
+    window = overlap(shape, row, column, (2 * half[0] + 1, 2 * half[1] + 1))
+    if window is None:
+        return None
+    broad = _broad(optics, one, tapers, window) if max(half) > BROAD else None
+    return Derivatives(window, _images(optics, one, tapers, window) if broad is None else broad)
+
+
+def _broad(
+    optics: Optics, one: SourceArrays, tapers: tuple[_Taper, _Taper] | None, window: Window
+) -> Array | None:
+    """Images of a smooth profile on a large window; None where its core is as large."""
+    if not np.isfinite(one.index[0]):
+        return None
+    core, parts = split(one)
+    wing = _reach(optics, CORE_LEVEL / optics.point_area)
+    longest = core.r_half * float(core.sigma.max(initial=0.0))
+    taper = _Taper(float(np.hypot(wing, 5 * longest)))
+    if taper.half > LARGEST_CORE:
+        return None
+    y, x = float(one.y[0]), float(one.x[0])
+    (ny, nx), (top, left) = zip(*((w.stop - w.start, w.start) for w in window), strict=True)
+    far = min(_reach(optics, FAR_LEVEL / optics.point_area), float(max(ny, nx)))
+    images = broad_images(optics, parts, y - top, x - left, (ny, nx), far)
+    n = 2 * taper.half + 1
+    near = overlap((ny, nx), round(y) - taper.half - top, round(x) - taper.half - left, (n, n))
+    if near is not None and core.sigma.size:
+        rows, columns = near
+        placed = (
+            slice(rows.start + top, rows.stop + top),
+            slice(columns.start + left, columns.stop + left),
+        )
+        images[:, rows, columns] += _images(optics, one, (taper, taper), placed, core)
+    if tapers is not None:
+        (end_y, slope_y), (end_x, slope_x) = (
+            each.values(np.arange(w.start, w.stop, dtype=np.float64) - v)
+            for each, w, v in zip(tapers, window, (y, x), strict=True)
+        )
+        end = end_y[:, None] * end_x
+        image = images[0].copy()
+        images *= end
+        images[1] += image * (end_y[:, None] * slope_x)
+        images[2] += image * (slope_y[:, None] * end_x)
+    return images
 
 
 def _reach(optics: Optics, level: float) -> float:
@@ -139,7 +222,7 @@ def _image_reach(optics: Optics, level: float) -> float:
     taper = _Taper(optics.extent + 20.0)
     n = 2 * taper.half + 1
     here = np.full(1, float(taper.half))
-    one = replace(_POINT, x=here, y=here)
+    one = replace(POINT, x=here, y=here)
     image = _images(optics, one, (taper, taper), (slice(0, n), slice(0, n)))[0]
     offset = np.arange(n) - here
     bright = np.abs(image) > level
@@ -205,7 +288,8 @@ def _cos_sin(angle: Array) -> tuple[Array, Array]:
 
 
 _NOTHING = np.zeros(1)
-_POINT = SourceArrays(
+# One point at the origin.
+POINT = SourceArrays(
     np.array(["point"]),
     *(_NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING, _NOTHING),
     np.array([""]),
@@ -214,7 +298,7 @@ _POINT = SourceArrays(
 
 @lru_cache(maxsize=16)
 def _point_limit(optics: Optics) -> float:
-    return highest_frequency(optics, _POINT, 1.0, TAIL / optics.point_area)
+    return highest_frequency(optics, POINT, 1.0, TAIL / optics.point_area)
 
 
 @lru_cache(maxsize=16)
@@ -249,9 +333,16 @@ def _inside(
 
 
 def _images(
-    optics: Optics, one: SourceArrays, tapers: tuple[_Taper, _Taper], window: Window
+    optics: Optics,
+    one: SourceArrays,
+    tapers: tuple[_Taper, _Taper],
+    window: Window,
+    core: Ellipses | None = None,
 ) -> Array:
-    """Image and derivatives of one source on a window, shape (3 or 6, ny, nx)."""
+    """Image and derivatives of one source on a window, shape (3 or 6, ny, nx).
+
+    If there is a ``core``, of these Gaussians of the source alone.
+    """
     limit = (
         _point_limit(optics)
         if one.kind[0] == "point"
@@ -264,7 +355,8 @@ def _images(
     spectra: list[Transfer] = [optics.transfer(ky, kx) * weight]
     if one.kind[0] != "point":
         system = spectra[0]
-        spectra = [system * each for each in _transforms(one, ky, kx)]
+        own = _transforms(one, ky, kx) if core is None else core.transforms(ky, kx)
+        spectra = [system * each for each in own]
     value_y, slope_y = _phases(tapers[0], ky, window[0], float(one.y[0]))
     value_x, slope_x = _phases(tapers[1], kx, window[1], float(one.x[0]))
     along_x = spectra[0] @ value_x.T
