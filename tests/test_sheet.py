@@ -375,6 +375,11 @@ def test_an_old_file_is_kept(tmp_path):
         ({"observations": [ONE, ONE.replace(shape=(9, 9))]}, "give frames of the same shape"),
         ({"goals": [{"rows": 1}]}, "a goal is {'rows': 1}"),
         ({"goals": [{"rows": 1, "mag": 3}]}, "snr, flux_ratio, position"),
+        (
+            {"goals": [{"rows": 30, "snr": 3}]},
+            "'snr': 3}: there is no row 30; the table has 3 rows",
+        ),
+        ({"goals": [{"rows": [1, 1], "flux_ratio": 0.1}]}, "takes two different rows"),
         ({"rows": [3]}, "there is no row 3; the table has 3 rows"),
         ({"seed": -1}, "seed is -1"),
     ],

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .counts import checked_seed
 from .exposure import Exposure, expose, noise_ready_rate
-from .exposure_goal import exposure_for
+from .exposure_goal import checked_rows, exposure_for
 from .forecast import forecast
 from .limits import CountRateWarning, count_rate_warnings
 from .observation import OPEN, Observation
@@ -107,7 +107,7 @@ def proposal_sheet(
     if len({one.shape for one in given}) > 1:
         shapes = ", ".join(str(one.shape) for one in given)
         raise ValueError(f"the observations' shapes are {shapes}; give frames of the same shape.")
-    asked = [_checked_goal(goal) for goal in goals]
+    asked = [_checked_goal(goal, len(sources)) for goal in goals]
     shown = _rows(rows, sources, given[0])
     added = ""
     if len(given) == 1:
@@ -171,7 +171,7 @@ def _time(sources: Table, observation: Observation, goal: Mapping[str, Any]) -> 
             return str(error)
 
 
-def _checked_goal(goal: Any) -> dict[str, Any]:
+def _checked_goal(goal: Any, number: int) -> dict[str, Any]:
     if (
         not isinstance(goal, Mapping)
         or "rows" not in goal
@@ -182,6 +182,11 @@ def _checked_goal(goal: Any) -> dict[str, Any]:
             f"a goal is {goal!r}; give the rows and one of {', '.join(GOALS)}, such as "
             '{"rows": 3, "snr": 20}.'
         )
+    (name,) = set(goal) - {"rows"}
+    try:
+        checked_rows(name, goal["rows"], number)
+    except ValueError as error:
+        raise ValueError(f"a goal is {goal!r}: {error}") from error
     return dict(goal)
 
 
