@@ -187,7 +187,11 @@ def _set(one: QTable, name: str, number: float, observation: Observation, units:
         flux = units.read_flux(number, pivot)
         if flux == 0 and unit != FLUX_UNIT:
             raise ValueError(f"flux is 0, which cannot be given in {unit}; give one above 0.")
-        one["flux"] = (np.array([flux]) * FLUX_UNIT).to(unit, u.spectral_density(pivot * u.AA))
+        value = u.Quantity([flux], FLUX_UNIT)
+        # the conversion costs several ms, also to the same unit
+        one["flux"] = (
+            value if unit == FLUX_UNIT else value.to(unit, u.spectral_density(pivot * u.AA))
+        )
     elif name == "r_half":
         one["r_half"] = [units.read_length(number, observation.pixel_scale)] * u.pix
     elif name == "pa":
