@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QStyle, QStyleOptionComboBox
 from small_scene import SMALL, few_sources
 
 from napari_issis import source
@@ -179,3 +180,16 @@ def test_a_panel_of_the_menu_shares_the_place_of_the_simulator(panel, name):
     QTest.qWait(200)
     assert in_sight(main)
     assert abs(main.width() - width) < 30
+
+
+def test_the_band_of_each_channel_can_be_read(panel):
+    """Catches a box that cuts the text of the channel off."""
+    box = panel.instrument.channel.native
+    option = QStyleOptionComboBox()
+    box.initStyleOption(option)
+    room = box.style().subControlRect(
+        QStyle.ComplexControl.CC_ComboBox, option, QStyle.SubControl.SC_ComboBoxEditField, box
+    )
+    texts = [box.itemText(entry) for entry in range(box.count())]
+    assert any("Å" in text for text in texts)
+    assert all(box.fontMetrics().horizontalAdvance(text) <= room.width() for text in texts)

@@ -13,7 +13,7 @@ from qtpy.QtWidgets import QApplication, QLineEdit
 from small_scene import SMALL, few_sources
 from test_scene_edit import assert_consistent
 
-from napari_issis import random_sources, simulate, source
+from napari_issis import image_source, random_sources, simulate, source
 from napari_issis.exposure import same_table
 from napari_issis.plugin.layer_styles import kind_color
 from napari_issis.plugin.source_columns import COLUMNS, TEXTS, from_text, shown_values, to_text
@@ -74,6 +74,18 @@ def test_sorting(listed, name, order):
     assert values == sorted(values, reverse=order == Qt.SortOrder.DescendingOrder)
     assert all(value == "" for value in shown[len(values) :])
     assert sorted(listed.model.order) == [0, 1, 2, 3]
+
+
+def test_the_column_of_images_is_there_with_an_image(scene, listed):
+    """Catches an empty column beside the others, and one that stays hidden."""
+    assert listed.view.isColumnHidden(PLACE["image"])
+    assert not listed.view.isColumnHidden(PLACE["spectrum"])
+    scene.add(image_source(np.ones((4, 5)), 20.0, 40.0, 2e-14, pixel_scale=0.036))
+    listed.refresh()
+    assert not listed.view.isColumnHidden(PLACE["image"])
+    scene.undo()
+    listed.refresh()
+    assert listed.view.isColumnHidden(PLACE["image"])
 
 
 def test_a_flux_typed_redraws_no_marks(scene, listed):

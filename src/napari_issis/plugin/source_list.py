@@ -136,6 +136,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         if not self._following:
             return
         self.model.refresh()
+        self.view.setColumnHidden(PLACES["image"], not np.any(self.model.values["image"] != ""))
         self.forecast.follow()
         self._show_selection()
 
