@@ -314,7 +314,7 @@ class Scene:
         self._soon()
 
     def undo(self, event: Any = None) -> None:
-        """Take back the last edit of the sources or the PSF; nothing while the mouse holds one."""
+        """Take back the last edit of sources, PSF or frame; nothing while the mouse holds one."""
         self.editor.take_over()
         if self.editor.undo():
             self._restored()
@@ -327,7 +327,7 @@ class Scene:
 
     def _restored(self) -> None:
         self._show_sources()
-        # undo and redo change the PSF too
+        # undo and redo change the PSF and the frame too
         self.observation = self.editor.observation
 
     def wait(self, timeout: float = 60.0) -> None:
