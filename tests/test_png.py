@@ -4,11 +4,18 @@ import os
 
 import numpy as np
 import pytest
+from astropy.table import vstack
 from PIL import Image
 
 from napari_issis import source
 from napari_issis.plugin import layer_styles
-from napari_issis.png import ELLIPSE_COLORS, POINT_COLOR, write_png, write_source_png
+from napari_issis.png import (
+    ELLIPSE_COLORS,
+    POINT_COLOR,
+    write_png,
+    write_side_by_side_png,
+    write_source_png,
+)
 
 
 def picture(path):
@@ -174,3 +181,35 @@ def test_sources_outside_the_frame(tmp_path):
     write_source_png(tmp_path / "y.png", source("uniform", 1e7, 2, r_half=1e7), (5, 6))
     with pytest.raises(ValueError, match="shape is"):
         write_source_png(tmp_path / "z.png", source("point", 1, 2), (0, 6))
+
+
+@pytest.mark.parametrize("zoom", [1, 3])
+def test_side_by_side(tmp_path, zoom):
+    """Catches sides exchanged, one at another zoom or upside down, and a frame cut off."""
+    rng = np.random.default_rng(5)
+    image = rng.uniform(0, 9, (40, 50))
+    sources = vstack([source("point", 12.0, 30.0), source("uniform", 30.0, 9.0, r_half=7.0)])
+    look = {"scale": "sqrt", "limits": (1.0, 7.0), "colormap": "heat", "zoom": zoom}
+    write_side_by_side_png(tmp_path / "both.png", sources, image, **look, words={"Image": "me"})
+    write_png(tmp_path / "right.png", image, **look)
+    write_source_png(tmp_path / "left.png", sources, (40, 50), zoom=zoom)
+    both, text = picture(tmp_path / "both.png")
+    left, right = (picture(tmp_path / f"{side}.png")[0] for side in ("left", "right"))
+    assert both.shape == (40 * zoom, 100 * zoom + 2, 3)
+    np.testing.assert_array_equal(both[:, : 50 * zoom], left)
+    np.testing.assert_array_equal(both[:, 50 * zoom + 2 :], right)
+    assert (both[:, 50 * zoom : 50 * zoom + 2] == 128).all()
+    # the star near the upper left corner is where a reader of pixels expects it
+    assert both[: 20 * zoom, : 20 * zoom].any()
+    assert text["Image"] == "me"
+    assert (text["Scale"], text["Zoom"]) == ("sqrt", str(zoom))
+
+
+def test_side_by_side_refuses(tmp_path):
+    with pytest.raises(ValueError, match="two dimensions"):
+        write_side_by_side_png(tmp_path / "x.png", source("point", 1, 1), np.zeros(4))
+    with pytest.raises(ValueError, match="20002 pixels become 40004"):
+        write_side_by_side_png(
+            tmp_path / "x.png", source("point", 1, 1), np.zeros((1, 10000)), zoom=2
+        )
+    assert not list(tmp_path.iterdir())

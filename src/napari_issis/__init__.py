@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from .catalogue import Catalogue, read_catalogue, read_sources, write_sources
     from .fits_image import FitsImage, read_image
     from .plugin.scene import Scene
-    from .png import write_png, write_source_png
+    from .png import write_png, write_side_by_side_png, write_source_png
     from .rgba import read_rgba, write_rgba
     from .sheet import proposal_sheet
 
@@ -59,6 +59,7 @@ _LATER = {
     "FitsImage": "fits_image",
     "read_image": "fits_image",
     "write_png": "png",
+    "write_side_by_side_png": "png",
     "write_source_png": "png",
     "proposal_sheet": "sheet",
     "read_rgba": "rgba",
@@ -122,6 +123,7 @@ __all__ = [
     "star_cluster",
     "write_png",
     "write_rgba",
+    "write_side_by_side_png",
     "write_source_png",
     "write_sources",
 ]

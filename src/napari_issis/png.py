@@ -31,6 +31,8 @@ ELLIPSE_COLORS = {
     "sersic": "magenta",
     IMAGE: "dodgerblue",
 }
+# Between two pictures in one file, in pixels of the file.
+GAP, GAP_COLOR = 2, (128, 128, 128)
 # The outline of a star with five points, one of them up, and its radius in pixels of the file.
 STAR_RADIUS = 6.0
 _TURN = np.arange(10) * np.pi / 5
@@ -153,6 +155,18 @@ def write_source_png(
     The lines are one pixel of the file wide, on black, in the colours of `POINT_COLOR` and
     `ELLIPSE_COLORS`.
     """
+    picture = source_picture(sources, shape, zoom=zoom, pixel_scale=pixel_scale)
+    _save(picture, path, {"Zoom": str(zoom)}, overwrite=overwrite)
+
+
+def source_picture(
+    sources: Table,
+    shape: tuple[int, int],
+    *,
+    zoom: int = 1,
+    pixel_scale: float = PIXEL_SCALE,
+) -> Image.Image:
+    """Return the picture that `write_source_png` writes."""
     arrays = check_sources(sources, pixel_scale=pixel_scale)
     ny, nx = Observation(shape=shape).shape
     check_zoom(zoom, (ny, nx))
@@ -176,7 +190,62 @@ def write_source_png(
         y = (ny - 0.5 - seen.y[i] - outline[:, 1]) * zoom - 0.5
         points = np.clip(np.rint(np.stack([x, y], axis=1)), -1e6, 1e6)
         draw.line([tuple(point) for point in points], fill=ELLIPSE_COLORS.get(kind, POINT_COLOR))
-    _save(picture, path, {"Zoom": str(zoom)}, overwrite=overwrite)
+    return picture
+
+
+def write_side_by_side_png(
+    path: str | os.PathLike[str],
+    sources: Table,
+    image: ArrayLike,
+    *,
+    scale: str = "linear",
+    limits: tuple[float, float] | None = None,
+    colormap: str | NDArray[np.uint8] = "gray",
+    zoom: int = 1,
+    words: dict[str, str] | None = None,
+    overwrite: bool = False,
+    pixel_scale: float = PIXEL_SCALE,
+) -> None:
+    """Write one PNG file of a source model, at the left, and of the final image at its right.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; its name ends in ``.png``.
+    sources : astropy.table.QTable
+        A source table, drawn as by `write_source_png`.
+    image : array_like, shape (ny, nx)
+        The image, drawn as by `write_png`; its shape is the frame's.
+    scale, limits, colormap, zoom, words, overwrite
+        As of `write_png`; zoom and overwrite for both.
+    pixel_scale : float
+        Arcsec per pixel, for radii given as angles; by default that of ISSIS.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not as `write_png` and `write_source_png` have it, or the two are
+        wider together than a PNG may be.
+    OSError
+        If the file cannot be written; `FileExistsError` if it exists.
+
+    Notes
+    -----
+    A grey line of `GAP` PNG pixels parts the two.
+    """
+    right, (low, high) = image_picture(
+        image, scale=scale, limits=limits, colormap=colormap, zoom=zoom
+    )
+    ny, nx = np.shape(image)
+    check_zoom(zoom, (ny, 2 * nx + GAP))
+    left = source_picture(sources, (ny, nx), zoom=zoom, pixel_scale=pixel_scale)
+    both = Image.new("RGB", (2 * left.width + GAP, left.height), GAP_COLOR)
+    both.paste(left, (0, 0))
+    both.paste(right, (left.width + GAP, 0))
+    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
+    if isinstance(colormap, str):
+        text["Colormap"] = colormap
+    _save(both, path, text | (words or {}), overwrite=overwrite)
 
 
 def _rectangle(image: str, r_half: float, pa: float) -> NDArray[np.float64]:

@@ -172,7 +172,7 @@ def menu(scene, qtbot, tmp_path, monkeypatch):
     return menu
 
 
-def test_the_menu_writes_all_three(scene, menu, tmp_path):
+def test_the_menu_writes_all_of_them(scene, menu, tmp_path):
     """Catches a picture that is upside down, in other limits, or RGBA data of what is shown."""
     scene.counts.scale = "log"
     scene.counts.set_limits((2.0, 50.0))
@@ -195,6 +195,9 @@ def test_the_menu_writes_all_three(scene, menu, tmp_path):
     model = np.asarray(Image.open(tmp_path / "sources.png").convert("RGB"))
     assert model.shape == pixels.shape
     assert model.any()
+    both = np.asarray(Image.open(tmp_path / "both.png").convert("RGB"))
+    assert np.array_equal(both[:, : model.shape[1]], model)
+    assert np.array_equal(both[:, -model.shape[1] :], pixels[::-1])
 
 
 def test_counts_too_large_for_colours(scene, menu, tmp_path):
@@ -202,7 +205,7 @@ def test_counts_too_large_for_colours(scene, menu, tmp_path):
     notification_manager.records.clear()
     scene.observation = SMALL.replace(exposure=1e9)
     scene.wait()
-    menu.actions()[2].trigger()
+    menu.actions()[3].trigger()
     assert "16,777,215" in told() or "16777215" in told()
     assert not (tmp_path / "counts.png").exists()
 

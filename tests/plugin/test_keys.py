@@ -21,6 +21,7 @@ from napari_issis.plugin.keys import SHORTCUTS, KeysDialog, markdown_table
 from napari_issis.plugin.scene import open_scene
 from napari_issis.plugin.source_list import SourceList
 from napari_issis.plugin.trace_docks import show_traces
+from napari_issis.sources import DEFAULT_R_HALF
 
 pytestmark = pytest.mark.filterwarnings("ignore::napari_issis.CountRateWarning")
 README = Path(__file__).parents[2] / "README.md"
@@ -147,6 +148,34 @@ def test_up_is_up_on_the_screen(viewer, mouse):
     scene.nudge(0, 1)
     assert scene.sources["y"][0] == 11.5
     scene.wait()
+
+
+@pytest.mark.needs_gl
+def test_a_key_changes_the_kind_of_what_is_selected(window):
+    """Catches other sources changed, a size that is lost or missing, a step for each source."""
+    before, chosen = window.sources, window.editor.source_id[[1, 2]].tolist()
+    steps = len(window.editor.history._past)
+    window.editor.select(chosen)
+    window.viewer.layers.selection.active = window.editor.points.layer
+    kinds = ["uniform", "gaussian", "exponential", "devaucouleurs", "sersic", "point", "uniform"]
+    for number, kind in enumerate(kinds, start=1):
+        press(window, Qt.Key.Key_K, SHIFT)
+        table = window.sources
+        assert list(table["kind"]) == ["point", kind, kind, "sersic"]
+        assert window.editor.selected_ids == set(chosen)
+        assert len(window.editor.history._past) == steps + number
+        for name in ("x", "y", "flux"):
+            assert np.array_equal(table[name], before[name])
+        assert table["r_half"][1].value == DEFAULT_R_HALF
+        assert table["r_half"][2] == before["r_half"][2]
+        assert table["pa"][2] == before["pa"][2]
+        assert window.exposure == simulate(table, SMALL)
+    for _ in kinds:
+        press(window, Qt.Key.Key_Z, CONTROL)
+    assert same_table(window.sources, before)
+    window.editor.select([])
+    press(window, Qt.Key.Key_K, SHIFT)
+    assert same_table(window.sources, before)
 
 
 # ---------------------------------------------------------------- the lists of keys

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from astropy.coordinates import SkyCoord
 from qtpy.QtCore import Qt
+from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 from small_scene import SMALL, few_sources
 
@@ -93,6 +94,8 @@ def test_fingers_and_pens_are_left_to_qt(make_napari_viewer):
     viewer = make_napari_viewer(show=True)
     panel = SimulatorWidget(viewer)
     viewer.window.add_dock_widget(panel)
+    # what is done when it has come to the screen counts too
+    QTest.qWait(200)
     canvas = find_canvas(panel)
     while canvas is not None:
         assert not canvas.testAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)

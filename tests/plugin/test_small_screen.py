@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from astropy.table import vstack
 from qtpy.QtTest import QTest
-from qtpy.QtWidgets import QLabel
+from qtpy.QtWidgets import QLabel, QStyle, QStyleOptionComboBox
 from small_scene import SMALL, few_sources
 
 from napari_issis import SKIES, source
 from napari_issis.plugin.canvas_geometry import find_window, to_view_box
 from napari_issis.plugin.dock import SimulatorWidget
-from napari_issis.plugin.panels import LIST_NAME, ROW_NAME, _dock_of
+from napari_issis.plugin.panels import DOCK_NAME, LIST_NAME, ROW_NAME, find_dock
 from napari_issis.plugin.scene import open_scene
-from napari_issis.plugin.trace_docks import show_traces
+from napari_issis.plugin.source_list import SourceList
+from napari_issis.plugin.trace_docks import RowTrace, show_traces
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::napari_issis.CountRateWarning"),
@@ -89,26 +90,78 @@ def test_a_view_that_was_zoomed_stays(panel):
     assert (camera.zoom, camera.center) == (zoom, centre)
 
 
-@pytest.mark.parametrize("list_first", [True, False])
-def test_list_and_traces_together(panel, list_first):
-    """Catches a row trace beside the list, where it has not the width of the canvas."""
+def docks(panel):
+    docked = panel.scene.viewer.window.dock_widgets
+    return [
+        find_dock(next(docked[name] for name in docked if name.startswith(title)))
+        for title in (ROW_NAME, LIST_NAME)
+    ]
+
+
+def in_sight(dock):
+    return dock.isVisible() and not dock.visibleRegion().isEmpty()
+
+
+def open_both(panel, list_first):
     steps = [panel.toggle_list, lambda: show_traces(panel.scene.viewer)]
     for step in steps if list_first else steps[::-1]:
         step()
         QTest.qWait(300)
+
+
+@pytest.mark.parametrize("list_first", [True, False])
+def test_list_and_traces_are_tabs_of_a_low_window(panel, list_first):
+    """Catches a row trace too low to be read, or beside the list; the last one opened is seen."""
     window = find_window(panel)
-    docked = panel.scene.viewer.window.dock_widgets
-    row, listed = (
-        _dock_of(next(docked[name] for name in docked if name.startswith(title)))
-        for title in (ROW_NAME, LIST_NAME)
-    )
+    open_both(panel, list_first)
+    row, listed = docks(panel)
+    assert listed in window.tabifiedDockWidgets(row)
+    assert (in_sight(row), in_sight(listed)) == (list_first, not list_first)
+    assert window.width() <= 1366
+    assert window.height() <= 768
+    canvas = window.centralWidget()
+    assert canvas.height() > 0.5 * window.height()
+    # the button brings the list into sight before it hides it
+    if not in_sight(listed):
+        panel.toggle_list()
+        QTest.qWait(200)
+        assert in_sight(listed)
+    panel.toggle_list()
+    QTest.qWait(200)
+    assert not listed.isVisible()
+    assert in_sight(row)
+    assert row.findChild(RowTrace).plot.height() >= 85
+    assert row.geometry().left() <= canvas.geometry().left()
+    assert row.geometry().right() >= canvas.geometry().right() - 1
+
+
+def test_a_list_behind_the_trace_follows_nothing(panel):
+    """Catches a list that is kept up to date where nobody sees it, or that comes back old."""
+    open_both(panel, True)
+    _, listed = docks(panel)
+    source_list = listed.findChild(SourceList)
+    panel.scene.add(source("point", 9.0, 9.0))
+    QTest.qWait(300)
+    assert source_list.model.rowCount() == len(few_sources())
+    panel.toggle_list()
+    QTest.qWait(300)
+    assert source_list.model.rowCount() == len(few_sources()) + 1
+
+
+@pytest.mark.parametrize("list_first", [True, False])
+def test_list_below_the_row_trace_where_there_is_room(panel, list_first):
+    """Catches a row trace beside the list, where it has not the width of the canvas."""
+    window = find_window(panel)
+    window.resize(1366, 960)
+    QTest.qWait(200)
+    open_both(panel, list_first)
+    row, listed = docks(panel)
     assert row.geometry().bottom() <= listed.geometry().top() + 1
     assert row.width() == listed.width()
     canvas = window.centralWidget()
     assert row.geometry().left() <= canvas.geometry().left()
     assert row.geometry().right() >= canvas.geometry().right() - 1
     assert canvas.height() > 0.5 * window.height()
-    assert window.height() <= 768
 
 
 def test_no_line_of_text_is_cut(panel, qtbot):
@@ -138,3 +191,35 @@ def test_no_line_is_cut_after_another_camera(panel):
         scene.observation = own.replace(instrument=camera, channel=channel)
         QTest.qWait(300)
         assert sky.height() >= sky.heightForWidth(sky.width())
+
+
+@pytest.mark.parametrize("name", ["ISSIS exposure time", "ISSIS monitoring"])
+def test_a_panel_of_the_menu_shares_the_place_of_the_simulator(panel, name):
+    """Catches a panel below the simulator's, which leaves neither the room that it needs."""
+    viewer, window = panel.scene.viewer, find_window(panel)
+    main = find_dock(panel)
+    main.setWindowTitle(DOCK_NAME)
+    height, width = main.height(), main.width()
+    dock, _ = viewer.window.add_plugin_dock_widget("napari-issis", name)
+    QTest.qWait(300)
+    assert dock in window.tabifiedDockWidgets(main)
+    assert in_sight(dock)
+    assert not in_sight(main)
+    assert dock.height() > 0.9 * height
+    main.raise_()
+    QTest.qWait(200)
+    assert in_sight(main)
+    assert abs(main.width() - width) < 30
+
+
+def test_the_band_of_each_channel_can_be_read(panel):
+    """Catches a box that cuts the text of the channel off."""
+    box = panel.instrument.channel.native
+    option = QStyleOptionComboBox()
+    box.initStyleOption(option)
+    room = box.style().subControlRect(
+        QStyle.ComplexControl.CC_ComboBox, option, QStyle.SubControl.SC_ComboBoxEditField, box
+    )
+    texts = [box.itemText(entry) for entry in range(box.count())]
+    assert any("Å" in text for text in texts)
+    assert all(box.fontMetrics().horizontalAdvance(text) <= room.width() for text in texts)

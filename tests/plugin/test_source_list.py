@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from astropy.table import vstack
+from napari.utils.colormaps.standardize_color import transform_color
 from napari.utils.notifications import notification_manager
 from qtpy.QtCore import Qt
 from qtpy.QtTest import QTest
@@ -12,8 +13,9 @@ from qtpy.QtWidgets import QApplication, QLineEdit
 from small_scene import SMALL, few_sources
 from test_scene_edit import assert_consistent
 
-from napari_issis import random_sources, simulate, source
+from napari_issis import image_source, random_sources, simulate, source
 from napari_issis.exposure import same_table
+from napari_issis.plugin.layer_styles import kind_color
 from napari_issis.plugin.source_columns import COLUMNS, TEXTS, from_text, shown_values, to_text
 from napari_issis.plugin.source_list import SourceList
 from napari_issis.plugin.units import Units
@@ -72,6 +74,46 @@ def test_sorting(listed, name, order):
     assert values == sorted(values, reverse=order == Qt.SortOrder.DescendingOrder)
     assert all(value == "" for value in shown[len(values) :])
     assert sorted(listed.model.order) == [0, 1, 2, 3]
+
+
+def test_the_column_of_images_is_there_with_an_image(scene, listed):
+    """Catches an empty column beside the others, and one that stays hidden."""
+    assert listed.view.isColumnHidden(PLACE["image"])
+    assert not listed.view.isColumnHidden(PLACE["spectrum"])
+    scene.add(image_source(np.ones((4, 5)), 20.0, 40.0, 2e-14, pixel_scale=0.036))
+    listed.refresh()
+    assert not listed.view.isColumnHidden(PLACE["image"])
+    scene.undo()
+    listed.refresh()
+    assert listed.view.isColumnHidden(PLACE["image"])
+
+
+def test_a_flux_typed_redraws_no_marks(scene, listed):
+    """Catches positions written anew, a lost selection, features that lag behind."""
+    points = scene.editor.points.layer
+    drawn = []
+    points.events.set_data.connect(lambda event: drawn.append(event))
+    typed(listed, 0, "flux", "7e-15")
+    assert drawn == []
+    assert scene.sources["flux"][0].value == 7e-15
+    assert points.features["flux"][0] == 7e-15
+    assert points.selected_data == {0}
+    typed(listed, 0, "x", "21")
+    assert drawn
+    assert_consistent(scene)
+
+
+def test_a_kind_chosen_recolors_an_ellipse_that_stays(scene, listed):
+    """Catches an ellipse in the colour of the kind that it was, as its outline is the same."""
+    ellipses = scene.editor.ellipses.layer
+    before = ellipses.edge_color.copy()
+    corners = [corner.copy() for corner in ellipses.data]
+    listed.model.setData(listed.model.index(2, 0), "uniform")
+    assert np.array_equal(ellipses.data, corners)
+    assert ellipses.edge_color[0] == pytest.approx(transform_color(kind_color("uniform"))[0])
+    assert not np.allclose(ellipses.edge_color[0], before[0])
+    assert np.array_equal(ellipses.edge_color[1], before[1])
+    assert_consistent(scene)
 
 
 def test_a_spectrum_typed_into_the_list(scene, listed):

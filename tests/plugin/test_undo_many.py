@@ -14,6 +14,7 @@ from typed import enter
 
 from napari_issis import source, write_sources
 from napari_issis.exposure import same_table
+from napari_issis.plugin.instrument_form import InstrumentForm
 from napari_issis.plugin.source_columns import COLUMNS
 from napari_issis.plugin.source_form import SourceForm
 from napari_issis.plugin.source_list import SourceList
@@ -188,19 +189,37 @@ def test_fifty_steps_of_every_kind(user, scene):
     assert_consistent(scene)
 
 
-def test_undo_across_a_change_of_the_frame(scene, mouse):
-    """Catches sources lost with a smaller frame, and an undo that brings an old frame back."""
+def test_undo_of_a_change_of_the_frame(scene, mouse, qtbot):
+    """Catches a frame that stays, sources lost with a smaller one, other controls set back."""
+    form = InstrumentForm(scene)
+    qtbot.addWidget(form)
+    form.resume()
     mouse.drag((60.0, 50.0), (61.0, 50.0), (70.0, 60.0))
     scene.wait()
-    moved = scene.sources
-    for shape in ((32, 40), (128, 100)):
-        scene.observation = SMALL.replace(shape=shape)
+    moved, history = scene.sources, scene.editor.history
+    box = form.frame.native
+    QTest.keyClick(box, Qt.Key.Key_Home)
+    larger = scene.observation.shape
+    assert larger != SMALL.shape
+    assert history.last_step == "change the frame"
+    scene.observation = scene.observation.replace(shape=(32, 40))
+    scene.observation = scene.observation.replace(exposure=77.0)
+    layer = scene.editor.points.layer
+    keys = {str(key): action for key, action in layer.keymap.items()}
+    undo, redo = keys["Ctrl+Z"], keys["Ctrl+Shift+Z"]
+    # backwards: to the larger frame, the first one, and the place before the drag
+    for shape, table in ((larger, moved), (SMALL.shape, moved), (SMALL.shape, few_sources())):
+        undo(layer)
         scene.wait()
-        assert same_table(scene.sources, moved)
-        scene.undo()
+        assert scene.observation.shape == scene.counts.layer.data.shape == shape
+        assert same_table(scene.sources, table)
+        assert form.frame.value == shape
         assert_consistent(scene)
-        assert same_table(scene.sources, few_sources())
+    assert not history.last_step
+    assert scene.observation.exposure == 77.0
+    for shape in (SMALL.shape, larger, (32, 40)):
+        redo(layer)
+        scene.wait()
         assert scene.counts.layer.data.shape == shape
-        scene.redo()
-        assert_consistent(scene)
         assert same_table(scene.sources, moved)
+    assert_consistent(scene)

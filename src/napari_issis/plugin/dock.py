@@ -25,7 +25,7 @@ from .display_form import DisplayForm
 from .instrument_form import InstrumentForm
 from .keys import show_keys
 from .missing_layers import MissingLayers
-from .panels import LIST_NAME, toggle_panel
+from .panels import DOCK_NAME, LIST_NAME, toggle_panel
 from .png_menu import PngMenu
 from .progress_row import ProgressRow
 from .push_button import push_button
@@ -35,8 +35,6 @@ from .source_form import SourceForm
 from .source_list import SourceList
 from .view_form import ViewForm
 from .writer import fits_path
-
-DOCK_NAME = "ISSIS simulator"
 
 # The file types that the dialog offers, and what is written.
 FITS_FORMS: dict[str, dict[str, Any]] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -130,7 +131,7 @@ class SourceEditor:
                 source_id = np.concatenate([source_id, ids])
         # ids go up from row to row
         order = np.argsort(source_id)
-        return SourceState(table[order], source_id[order])
+        return replace(self._state(), sources=table[order], source_id=source_id[order])
 
     def change(self, table: QTable) -> None:
         """Put a master table with the same rows, edited, in the table's place; `write` shows it."""
@@ -150,7 +151,8 @@ class SourceEditor:
         """Put a state in the place of the present one; False if there is none."""
         if state is None:
             return False
-        self.observation = with_psf_choice(self.observation, state.psf)
+        observation = with_psf_choice(self.observation, state.psf)
+        self.observation = observation.replace(shape=state.shape)
         gone = np.isin(self.source_id, state.source_id, invert=True)
         self._bury(gone)
         self._set(state.sources, state.source_id)
@@ -185,7 +187,7 @@ class SourceEditor:
             self.take_over()
 
     def observe(self, observation: Observation) -> None:
-        """Take over another set-up; a change of its PSF is a step of the history."""
+        """Take over another set-up; a change of its PSF or frame is a step of the history."""
         self.observation = observation
         if self.held is None:
             self._note()
@@ -203,7 +205,8 @@ class SourceEditor:
         self.history.note(self._state())
 
     def _state(self) -> SourceState:
-        return SourceState(self.sources, self.source_id, psf_choice(self.observation))
+        observation = self.observation
+        return SourceState(self.sources, self.source_id, psf_choice(observation), observation.shape)
 
     def _bury(self, gone: NDArray[np.bool_]) -> None:
         """Keep rows that go, for those that come back by paste."""

@@ -25,6 +25,7 @@ from ..observation import Observation
 from .goal_plot import GoalCurve, GoalPlot
 from .instrument_form import style_warning
 from .number_field import NumberField
+from .panels import find_dock, place_soon, share_place
 from .push_button import push_button
 from .scene import open_scene
 from .scene_forecast import SceneForecast
@@ -91,7 +92,7 @@ class GoalPanel(QWidget):  # type: ignore[misc]
         layout.addWidget(self.button)
         self.seconds: float | None = None
         self._shown_kind = "snr"
-        self._following = False
+        self._following = self._placed = False
         self.kind.currentIndexChanged.connect(self._kind_changed)
         self.target.changed.connect(self.show_answer)
         self.forecast.changed.connect(self.show_answer)
@@ -190,27 +191,40 @@ class GoalPanel(QWidget):  # type: ignore[misc]
 
     def showEvent(self, event: QShowEvent) -> None:
         """Follow the scene while visible (napari gives docked widgets no close event)."""
-        if not self._following:
-            self._following = self.forecast.on = True
-            events = self.scene.events
-            for emitter in (events.sources, events.observation, events.picture):
-                emitter.connect(self._scene_changed)
-            events.selection.connect(self.show_answer)
-            self.scene.viewer.events.theme.connect(self.show_answer)
-            self._scene_changed()
+        self._follow(True)
         super().showEvent(event)
+        dock = find_dock(self)
+        if dock is not None and not self._placed:
+            self._placed = True
+            place_soon(self, share_place)
+            # a tab behind another one gets no event
+            dock.visibilityChanged.connect(self._follow)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Cost nothing while hidden."""
-        if self._following:
-            self._following = self.forecast.on = False
-            events = self.scene.events
-            for emitter in (events.sources, events.observation, events.picture):
-                emitter.disconnect(self._scene_changed)
-            events.selection.disconnect(self.show_answer)
-            self.scene.viewer.events.theme.disconnect(self.show_answer)
-            self.forecast.pause()
+        self._follow(False)
         super().hideEvent(event)
+
+    def _follow(self, on: bool) -> None:
+        if on == self._following:
+            return
+        self._following = self.forecast.on = on
+        events = self.scene.events
+        for emitter, slot in (
+            (events.sources, self._scene_changed),
+            (events.observation, self._scene_changed),
+            (events.picture, self._scene_changed),
+            (events.selection, self.show_answer),
+            (self.scene.viewer.events.theme, self.show_answer),
+        ):
+            if on:
+                emitter.connect(slot)
+            else:
+                emitter.disconnect(slot)
+        if on:
+            self._scene_changed()
+        else:
+            self.forecast.pause()
 
 
 def _positive(number: float) -> None:

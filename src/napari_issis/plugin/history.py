@@ -1,4 +1,4 @@
-"""Undo and redo: the source tables and PSFs that were, and those that were undone."""
+"""Undo and redo: the sources, PSFs and frames that were, and those that were undone."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from ..exposure import same_table
+from ..observation import Observation
 from ..psf import PSF
 
 MOST_STEPS = 200
@@ -30,15 +31,18 @@ class SourceState:
         The ids of its rows.
     psf : dict or PSF, optional
         What was chosen as the PSF, see `napari_issis.psf_blurs.psf_choice`.
+    shape : (int, int), optional
+        The frame ``(ny, nx)``.
     """
 
     sources: QTable
     source_id: NDArray[np.int64]
     psf: dict[str, float] | PSF = field(default_factory=dict)
+    shape: tuple[int, int] = Observation().shape
 
     def same(self, other: SourceState) -> bool:
-        """Whether both hold the same rows, and the same PSF."""
-        return self.psf == other.psf and self.same_rows(other)
+        """Whether both hold the same rows, PSF and frame."""
+        return self.shape == other.shape and self.psf == other.psf and self.same_rows(other)
 
     def same_rows(self, other: SourceState) -> bool:
         """Whether both hold the same rows."""
@@ -108,7 +112,7 @@ class History:
 def describe(before: SourceState, after: SourceState) -> str:
     """Say what leads from one state to the next, such as ``move 1 source``."""
     if before.same_rows(after):
-        return "change the PSF"
+        return "change the PSF" if before.shape == after.shape else "change the frame"
     added = int(np.isin(after.source_id, before.source_id, invert=True).sum())
     removed = int(np.isin(before.source_id, after.source_id, invert=True).sum())
     if added and removed:

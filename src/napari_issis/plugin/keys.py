@@ -8,7 +8,7 @@ from typing import Any
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QLabel, QVBoxLayout, QWidget
 
-from .scene import DELETE_KEYS, FINE_STEP
+from .scene import DELETE_KEYS, FINE_STEP, KIND_KEY
 from .trace_docks import FREEZE_KEY
 from .zoom import FIT_KEY, KEYS
 
@@ -62,6 +62,7 @@ SHORTCUTS = (
     Shortcut(tuple(KEYS.values()), "Zoom by this factor"),
     Shortcut((FIT_KEY,), "Show the whole frame"),
     Shortcut((FREEZE_KEY,), "Freeze the traces, or let them follow the pointer"),
+    Shortcut((KIND_KEY,), "Make the selected sources the next kind"),
     Shortcut(DELETE_KEYS, "Remove the selected sources"),
     Shortcut(("Control-C", "Control-V"), "Copy, paste the selected sources", ours=False),
     Shortcut(("Delete",), "Remove the selected sources", canvas=False, sources=True),

@@ -10,6 +10,7 @@ from typing import Any
 from astropy.table import QTable
 from napari.utils.notifications import show_error, show_info
 from qtpy.QtCore import Signal
+from qtpy.QtGui import QShowEvent
 from qtpy.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
@@ -25,6 +26,7 @@ from .curves_window import CurvesWindow
 from .latest_wins import LatestWins
 from .monitoring_form import MonitoringForm
 from .monitoring_layer import show_monitoring
+from .panels import place_soon, share_place
 from .push_button import push_button
 from .scene import open_scene
 from .writer import fits_path
@@ -74,6 +76,7 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
         self.curves: CurvesWindow | None = None
         self._jobs = LatestWins(self._done, self._failed)
         self._wanted = 0
+        self._placed = False
         self.told.connect(self._show_progress)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(4, 2, 4, 4)
@@ -143,6 +146,13 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
         self._idle()
 
     # ---------------------------------------------------------------- in between
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Take a place when shown first."""
+        super().showEvent(event)
+        if not self._placed:
+            self._placed = True
+            place_soon(self, share_place)
 
     def _start(self, job: Callable[[Monitoring, Tell], Any], then: Callable[[Any], None]) -> None:
         try:

@@ -11,10 +11,11 @@ from qtpy.QtWidgets import QDockWidget, QMainWindow, QWidget
 
 from .canvas_geometry import find_window
 
-LIST_NAME, ROW_NAME = "ISSIS sources", "ISSIS row trace"
-BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
-# Heights in pixels on the screen: alone, and so much together that at 768 of them the canvas
-# keeps the half.
+DOCK_NAME, LIST_NAME, ROW_NAME = "ISSIS simulator", "ISSIS sources", "ISSIS row trace"
+RIGHT, BOTTOM = Qt.DockWidgetArea.RightDockWidgetArea, Qt.DockWidgetArea.BottomDockWidgetArea
+# Height of the window, pixels on the screen, from which list and row trace have room below the
+# canvas together; and their heights, alone and together.
+ROOMY = 900
 ALONE = 150
 TOGETHER = {ROW_NAME: 120, LIST_NAME: 150}
 
@@ -36,45 +37,97 @@ def toggle_panel(viewer: Any, name: str, make: Callable[[Any], QWidget], area: s
     # napari adds the plugin's name to the title of what its own menus open
     for title, widget in viewer.window.dock_widgets.items():
         if title.startswith(name):
-            dock = _dock_of(widget)
-            dock.setVisible(not dock.isVisible())
+            dock = find_dock(widget)
+            assert dock is not None
+            # a tab behind another one is no less visible for Qt
+            in_sight = dock.isVisible() and not dock.visibleRegion().isEmpty()
+            dock.setVisible(not in_sight)
+            dock.raise_()
             return
-    widget = make(viewer)
-    viewer.window.add_dock_widget(widget, name=name, area=area)
-    window = find_window(widget)
+    windows = [find_window(widget) for widget in viewer.window.dock_widgets.values()]
+    # side by side for a moment, two panels may be wider than the screen
+    low = any(window is not None and window.height() < ROOMY for window in windows)
+    viewer.window.add_dock_widget(make(viewer), name=name, area=area, tabify=low)
 
-    def stack() -> None:
+
+def find_dock(widget: QWidget) -> QDockWidget | None:
+    """Find the dock that holds a widget."""
+    parent = widget
+    while parent is not None and not isinstance(parent, QDockWidget):
+        parent = parent.parentWidget()
+    return parent
+
+
+def place_soon(widget: QWidget, place: Callable[[QMainWindow, QDockWidget], None]) -> None:
+    """Move the dock of a widget that is being shown, when that can be done: after it is shown.
+
+    The docks at the right keep the width that they had before.
+    """
+    window, dock = find_window(widget), find_dock(widget)
+    if window is None or dock is None:
+        return
+    widths = {other: other.width() for other in docks_at_right(window) if other is not dock}
+
+    def move() -> None:
         # the window may have been closed meanwhile
         with suppress(RuntimeError):
-            stack_at_bottom(window)
+            if not dock.isFloating():
+                place(window, dock)
+                window.resizeDocks(list(widths), list(widths.values()), Qt.Orientation.Horizontal)
 
-    if window is not None and name == LIST_NAME:
-        # napari shows it a little later
-        QTimer.singleShot(0, stack)
+    QTimer.singleShot(0, move)
 
 
-def stack_at_bottom(window: QMainWindow) -> None:
-    """Put the list of sources below the row trace, where Qt has them side by side.
+def docks_at_right(window: QMainWindow) -> list[QDockWidget]:
+    """Return the docks in sight at the right of a window."""
+    return [
+        dock
+        for dock in window.findChildren(QDockWidget)
+        if window.dockWidgetArea(dock) == RIGHT and dock.isVisible() and not dock.isFloating()
+    ]
 
-    The trace has the axis of the canvas, and needs its width.
+
+def share_place(window: QMainWindow, dock: QDockWidget) -> None:
+    """Make a dock a tab of the simulator panel's place, if napari put it above or below that."""
+    for panel in window.findChildren(QDockWidget):
+        if (
+            panel.windowTitle().startswith(DOCK_NAME)
+            and panel is not dock
+            and not panel.isHidden()
+            and not panel.isFloating()
+            and window.dockWidgetArea(panel) == window.dockWidgetArea(dock)
+            and dock not in window.tabifiedDockWidgets(panel)
+        ):
+            window.tabifyDockWidget(panel, dock)
+            dock.raise_()
+
+
+def place_at_bottom(window: QMainWindow, dock: QDockWidget) -> None:
+    """Move a dock from where napari puts new ones to below the canvas.
+
+    List of sources and row trace are one below the other there, or tabs where the window is
+    low. The trace has the axis of the canvas, and needs its width.
     """
+    if window.dockWidgetArea(dock) == RIGHT:
+        window.addDockWidget(BOTTOM, dock)
+    if window.dockWidgetArea(dock) != BOTTOM:
+        return
     found: dict[str, QDockWidget] = {}
-    for dock in window.findChildren(QDockWidget):
+    for other in window.findChildren(QDockWidget):
         for name in (ROW_NAME, LIST_NAME):
-            here = window.dockWidgetArea(dock) == BOTTOM and not dock.isFloating()
-            if here and not dock.isHidden() and dock.windowTitle().startswith(name):
-                found[name] = dock
-    if len(found) == 2 and not window.tabifiedDockWidgets(found[ROW_NAME]):
-        # one that is being shown just now is not moved unless it is taken out first
-        window.removeDockWidget(found[LIST_NAME])
-        window.splitDockWidget(found[ROW_NAME], found[LIST_NAME], Qt.Orientation.Vertical)
-        found[LIST_NAME].show()
-    heights = [TOGETHER[name] if len(found) == 2 else ALONE for name in found]
-    window.resizeDocks(list(found.values()), heights, Qt.Orientation.Vertical)
-
-
-def _dock_of(widget: QWidget) -> QWidget:
-    dock = widget
-    while not isinstance(dock, QDockWidget):
-        dock = dock.parentWidget()
-    return dock
+            here = window.dockWidgetArea(other) == BOTTOM and not other.isFloating()
+            if here and not other.isHidden() and other.windowTitle().startswith(name):
+                found[name] = other
+    heights = list(found.values()), [ALONE] * len(found)
+    if len(found) == 2 and not window.tabifiedDockWidgets(dock):
+        row, listed = found[ROW_NAME], found[LIST_NAME]
+        if window.height() < ROOMY:
+            window.tabifyDockWidget(row, listed)
+        else:
+            # one that is being shown just now is not moved unless it is taken out first
+            window.removeDockWidget(listed)
+            window.splitDockWidget(row, listed, Qt.Orientation.Vertical)
+            heights = [row, listed], [TOGETHER[ROW_NAME], TOGETHER[LIST_NAME]]
+            listed.show()
+    window.resizeDocks(*heights, Qt.Orientation.Vertical)
+    dock.raise_()

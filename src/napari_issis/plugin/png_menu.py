@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 from napari.utils.notifications import show_error, show_info
+from numpy.typing import NDArray
 from qtpy.QtWidgets import QFileDialog, QMenu, QWidget
 
-from ..png import write_png, write_source_png
+from ..png import write_png, write_side_by_side_png, write_source_png
 from ..rgba import write_rgba
 from .brightness import SCALES, stretched
 from .scene import Scene
@@ -47,6 +48,12 @@ class PngMenu(QMenu):  # type: ignore[misc]
                 self.write_model,
             ),
             (
+                "&Both side by side…",
+                "both.png",
+                "The source model at the left, the final image as it is shown at the right",
+                self.write_both,
+            ),
+            (
                 "&RGBA data…",
                 "counts.png",
                 "Counts in the colours: C = R + 256 G + 65536 B",
@@ -61,6 +68,17 @@ class PngMenu(QMenu):  # type: ignore[misc]
 
     def write_image(self, path: str) -> None:
         """Write the final image as it is shown, one pixel a PNG pixel, small ones magnified."""
+        level, look = self._as_shown()
+        write_png(path, level, **look)
+
+    def write_both(self, path: str) -> None:
+        """Write the source model and, at its right, the final image as it is shown."""
+        level, look = self._as_shown()
+        step = self.scene.observation.pixel_scale
+        write_side_by_side_png(path, self.scene.sources, level, **look, pixel_scale=step)
+
+    def _as_shown(self) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """Return the levels of the final image on the screen, and how they are written."""
         counts, exposure = self.scene.counts, self.scene.exposure
         layer = counts.layer
         if layer is None:
@@ -68,20 +86,18 @@ class PngMenu(QMenu):  # type: ignore[misc]
         scale, limits = counts.effective_scale, counts.limits
         level = stretched(scale, layer.data, limits, exposure.background)
         colors = (255 * counts.base_colormap.map(np.arange(256) / 255)[:, :3]).round()
-        write_png(
-            path,
-            level,
-            limits=(0.0, 1.0),
-            colormap=colors.astype(np.uint8),
-            zoom=self._zoom,
-            words={
+        return level, {
+            "limits": (0.0, 1.0),
+            "colormap": colors.astype(np.uint8),
+            "zoom": self._zoom,
+            "words": {
                 "Image": counts.shows,
                 "Scale": SCALES[scale],
                 "Limits": f"{limits[0]:g} {limits[1]:g}",
                 "Colormap": counts.base_colormap.name,
             },
-            overwrite=True,
-        )
+            "overwrite": True,
+        }
 
     def write_model(self, path: str) -> None:
         """Draw the sources, magnified as the final image is."""

@@ -11,7 +11,6 @@ from qtpy.QtGui import QShowEvent
 from qtpy.QtWidgets import QLabel, QToolButton
 
 from ..encircled_energy import psf_table
-from ..observation import Observation
 from ..psf import PSF, RadialPSF, TelescopePSF
 from ..psf_blurs import BLURS, blurs_of, with_blurs
 from .form import Form
@@ -97,7 +96,7 @@ class PsfRows:
         observation = self.scene.observation
         blurs = blurs_of(observation)
         if observation.psf_assumed:
-            text = _assumed_text(observation)
+            text = f"assumed for {observation.instrument.name}"
         elif blurs:
             text = "assumed, with blurs and halo as edited"
         else:
@@ -209,9 +208,3 @@ def _field(name: str, tooltip: str) -> NumberField:
         return TelescopePSF(1.7, **{**halo, name: number})
 
     return NumberField(name, 0.0, tooltip, check=check)
-
-
-def _assumed_text(observation: Observation) -> str:
-    if observation.instrument.name == "ISSIS":
-        return "assumed, about 0.10″ FWHM; none is published"
-    return f"assumed, of {observation.instrument.name}"

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, cast
 from weakref import WeakValueDictionary
 
+import numpy as np
 from astropy.table import QTable, Table
 from napari.layers import Image
 from napari.utils.events import EmitterGroup, Event
@@ -18,14 +19,15 @@ from qtpy.QtWidgets import QApplication
 from ..exposure import Exposure
 from ..observation import Observation
 from ..source_rates import rates_per_flux
-from ..sources import source
+from ..sources import IMAGE, KINDS, source
 from .counts_layer import CountsLayer
 from .editor import SourceEditor
 from .latest_wins import LatestWins
 from .marks import MARKER
 from .picture import HeldSources, Picture, PictureMaker
 from .pointer import Pointer
-from .table import master_table
+from .source_columns import of_kind
+from .table import master_table, put
 from .units import Units
 
 # The live scene of each viewer, kept alive by its pointer in the viewer's mouse callbacks.
@@ -42,6 +44,7 @@ BURST = 600
 # Arrow keys: a pixel to the right and up; with Shift a part of it.
 ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Down": (0, -1), "Up": (0, 1)}
 FINE_STEP = 0.1
+KIND_KEY = "Shift-K"
 DELETE_KEYS = ("Delete", "Backspace")
 # Row 0 at the bottom and x to the right, as astronomers expect.
 ORIENTATION = ("up", "right")
@@ -294,6 +297,22 @@ class Scene:
         self.editor.remove(ids)
         self._show_sources()
 
+    def next_kind(self, layer: Any = None) -> None:
+        """Make the selected sources all of the kind after that of the first; images stay."""
+        self.editor.take_over()
+        ids = self.editor.selected_ids
+        table = self.editor.sources.copy()
+        rows = np.flatnonzero(np.isin(self.editor.source_id, list(ids)) & (table["kind"] != IMAGE))
+        if not rows.size or self.editor.held is not None:
+            return
+        kind = KINDS[(KINDS.index(str(table["kind"][rows[0]])) + 1) % len(KINDS)]
+        part = of_kind(table[rows], kind)
+        for name in part.colnames:
+            put(table, name, rows, part[name])
+        self.change(table)
+        # those that went to the other layer too
+        self.editor.select(ids)
+
     def nudge(self, right: float, up: float) -> None:
         """Move the selected sources as seen on the screen; several moves at once are one step.
 
@@ -314,7 +333,7 @@ class Scene:
         self._soon()
 
     def undo(self, event: Any = None) -> None:
-        """Take back the last edit of the sources or the PSF; nothing while the mouse holds one."""
+        """Take back the last edit of sources, PSF or frame; nothing while the mouse holds one."""
         self.editor.take_over()
         if self.editor.undo():
             self._restored()
@@ -327,7 +346,7 @@ class Scene:
 
     def _restored(self) -> None:
         self._show_sources()
-        # undo and redo change the PSF too
+        # undo and redo change the PSF and the frame too
         self.observation = self.editor.observation
 
     def wait(self, timeout: float = 60.0) -> None:
@@ -459,6 +478,7 @@ class Scene:
         """Bind our keys on a layer of ours: those of the viewer belong to the user."""
         layer.bind_key("Control-Z", self.undo, overwrite=True)
         layer.bind_key("Control-Shift-Z", self.redo, overwrite=True)
+        layer.bind_key(KIND_KEY, self.next_kind, overwrite=True)
         for key in DELETE_KEYS:
             layer.bind_key(key, self._remove_selected, overwrite=True)
         self._bind_arrows(layer)

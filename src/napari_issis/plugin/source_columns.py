@@ -160,9 +160,10 @@ def changed(
     """
     one = table[[row]]
     if name == "kind":
-        one["kind"] = np.array([typed], dtype="U13")
         if typed in KINDS:
-            one = _with_structure(one)
+            one = of_kind(one, typed)
+        else:
+            one["kind"] = np.array([typed])
     elif name == "spectrum":
         if typed.strip() or "spectrum" in table.colnames:
             put(one, name, 0, typed.strip() or "flat")
@@ -187,7 +188,11 @@ def _set(one: QTable, name: str, number: float, observation: Observation, units:
         flux = units.read_flux(number, pivot)
         if flux == 0 and unit != FLUX_UNIT:
             raise ValueError(f"flux is 0, which cannot be given in {unit}; give one above 0.")
-        one["flux"] = (np.array([flux]) * FLUX_UNIT).to(unit, u.spectral_density(pivot * u.AA))
+        value = u.Quantity([flux], FLUX_UNIT)
+        # the conversion costs several ms, also to the same unit
+        one["flux"] = (
+            value if unit == FLUX_UNIT else value.to(unit, u.spectral_density(pivot * u.AA))
+        )
     elif name == "r_half":
         one["r_half"] = [units.read_length(number, observation.pixel_scale)] * u.pix
     elif name == "pa":
@@ -196,18 +201,21 @@ def _set(one: QTable, name: str, number: float, observation: Observation, units:
         one[name] = [number]
 
 
-def _with_structure(one: QTable) -> QTable:
-    """Give a source whose kind was changed the structure that it lacks."""
-    r_half, ellipticity = one["r_half"].to_value(u.pix)[0], one["ellipticity"][0]
-    if not (np.isfinite(r_half) and r_half > 0):
-        one["r_half"] = [DEFAULT_R_HALF] * u.pix
-    if not 0 <= ellipticity < 1:
-        one["ellipticity"] = [DEFAULT_ELLIPTICITY]
-    if not np.isfinite(one["pa"].value[0]):
-        one["pa"] = [DEFAULT_PA] * u.deg
-    if one["kind"][0] == "sersic" and not ("n" in one.colnames and np.isfinite(one["n"][0])):
-        one["n"] = [DEFAULT_INDEX]
-    return one
+def of_kind(rows: QTable, kind: str) -> QTable:
+    """Return rows of a master table as sources of a kind, with defaults for what they lack."""
+    rows = rows.copy()
+    rows["kind"] = np.full(len(rows), kind, dtype="U13")
+    r_half, ellipticity = rows["r_half"].to_value(u.pix), np.asarray(rows["ellipticity"])
+    pa = rows["pa"].to_value(u.deg)
+    sized = np.isfinite(r_half) & (r_half > 0)
+    shaped = (ellipticity >= 0) & (ellipticity < 1)
+    rows["r_half"] = np.where(sized, r_half, DEFAULT_R_HALF) * u.pix
+    rows["ellipticity"] = np.where(shaped, ellipticity, DEFAULT_ELLIPTICITY)
+    rows["pa"] = np.where(np.isfinite(pa), pa, DEFAULT_PA) * u.deg
+    if kind == "sersic":
+        index = np.asarray(rows["n"]) if "n" in rows.colnames else np.full(len(rows), np.nan)
+        rows["n"] = np.where(np.isfinite(index), index, DEFAULT_INDEX)
+    return rows
 
 
 # ---------------------------------------------------------------- text of spreadsheets

@@ -94,6 +94,9 @@ class SourceLayer:
         """Put data into the layer, whatever it held."""
         raise NotImplementedError
 
+    def recolor(self, kinds: Iterable[str]) -> None:
+        """Give each mark the colour of its kind, where kinds have colours."""
+
     def changed(self) -> bool:
         """Whether the layer holds other sources than when last in step (cheap)."""
         if self.layer is None:
@@ -130,13 +133,17 @@ class SourceLayer:
         mark = {"role": self.role, "flux_unit": str(table["flux"].unit)}
         self.layer.metadata = {**self.layer.metadata, MARKER: mark}
         current = self.layer.features
-        if not (
-            len(current) == len(written)
-            and current.reindex(columns=written.columns).equals(written)
-            and self.shows(part)
-        ):
+        shown = self.shows(part)
+        told = len(current) == len(written) and bool(
+            current.reindex(columns=written.columns).equals(written)
+        )
+        if not (shown and told):
             selected = set(self.current_ids()[list(self.layer.selected_data)])
-            self.replace(self.geometry(part), part)
+            # napari draws all anew, which an edit of fluxes does not need
+            if shown:
+                self.recolor(part["kind"])
+            else:
+                self.replace(self.geometry(part), part)
             self.layer.features = written.copy()
             self.layer.selected_data = {
                 int(row) for row in np.flatnonzero(np.isin(ids, list(selected)))

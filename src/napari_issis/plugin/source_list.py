@@ -31,6 +31,7 @@ from superqt.utils import qthrottled
 from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
 from .cell_editors import CellEditors
 from .list_forecast import ListForecast, with_forecast
+from .panels import find_dock, place_at_bottom, place_soon
 from .photometry_dialog import PhotometryDialog
 from .push_button import push_button
 from .reader import tell_notes
@@ -125,7 +126,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         self.view.selectionModel().selectionChanged.connect(self._rows_selected)
         self.model.refused.connect(self._tell_refused)
         self._photometry: PhotometryDialog | None = None
-        self._following = self._selecting = False
+        self._following = self._selecting = self._placed = False
         self._soon = qthrottled(self.refresh, timeout=REST)
 
     # ---------------------------------------------------------------- list and layers
@@ -135,6 +136,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         if not self._following:
             return
         self.model.refresh()
+        self.view.setColumnHidden(PLACES["image"], not np.any(self.model.values["image"] != ""))
         self.forecast.follow()
         self._show_selection()
 
@@ -273,29 +275,40 @@ class SourceList(QWidget):  # type: ignore[misc]
 
     def showEvent(self, event: QShowEvent) -> None:
         """Follow the scene while visible (napari gives docked widgets no close event)."""
-        if not self._following:
-            self._following = True
-            events = self.scene.events
-            events.sources.connect(self._sources_changed)
-            events.observation.connect(self._sources_changed)
-            events.picture.connect(self._sources_changed)
-            events.selection.connect(self._show_selection)
-            self.scene.units.events.changed.connect(self._sources_changed)
-            self.refresh()
+        self._follow(True)
         super().showEvent(event)
+        dock = find_dock(self)
+        if dock is not None and not self._placed:
+            self._placed = True
+            place_soon(self, place_at_bottom)
+            # a tab behind another one gets no event
+            dock.visibilityChanged.connect(self._follow)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Cost nothing while hidden."""
-        if self._following:
-            self._following = False
-            events = self.scene.events
-            events.sources.disconnect(self._sources_changed)
-            events.observation.disconnect(self._sources_changed)
-            events.picture.disconnect(self._sources_changed)
-            events.selection.disconnect(self._show_selection)
-            self.scene.units.events.changed.disconnect(self._sources_changed)
-            self.forecast.pause()
+        self._follow(False)
         super().hideEvent(event)
+
+    def _follow(self, on: bool) -> None:
+        if on == self._following:
+            return
+        self._following = on
+        events = self.scene.events
+        for emitter, slot in (
+            (events.sources, self._sources_changed),
+            (events.observation, self._sources_changed),
+            (events.picture, self._sources_changed),
+            (events.selection, self._show_selection),
+            (self.scene.units.events.changed, self._sources_changed),
+        ):
+            if on:
+                emitter.connect(slot)
+            else:
+                emitter.disconnect(slot)
+        if on:
+            self.refresh()
+        else:
+            self.forecast.pause()
 
 
 def _count(sources: int, selected: int) -> str:

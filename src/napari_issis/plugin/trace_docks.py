@@ -21,13 +21,12 @@ from qtpy.QtWidgets import (
 )
 
 from .canvas_geometry import find_window
-from .panels import ROW_NAME, stack_at_bottom
+from .panels import RIGHT, ROW_NAME, docks_at_right, find_dock, place_at_bottom
 from .scene import open_scene
 from .trace_plot import TracePlot
 from .traces import Along, Trace, traces_of
 
 FREEZE_KEY = "Shift-F"
-RIGHT, BOTTOM = Qt.DockWidgetArea.RightDockWidgetArea, Qt.DockWidgetArea.BottomDockWidgetArea
 # Pixels on the screen.
 COLUMN_WIDTH = 150
 
@@ -178,10 +177,7 @@ class RowTrace(TraceWidget):
         return "&nbsp;&nbsp; ".join(parts)
 
     def _dock_beside_canvas(self, window: QMainWindow, dock: QDockWidget) -> None:
-        if window.dockWidgetArea(dock) == RIGHT:
-            window.addDockWidget(BOTTOM, dock)
-        if window.dockWidgetArea(dock) == BOTTOM:
-            stack_at_bottom(window)
+        place_at_bottom(window, dock)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Leave the docks at the right their height."""
@@ -241,23 +237,6 @@ ROW_DOCK, COLUMN_DOCK = ROW_NAME, "ISSIS column trace"
 _WIDGETS: dict[str, type[TraceWidget]] = {ROW_DOCK: RowTrace, COLUMN_DOCK: ColumnTrace}
 
 
-def find_dock(widget: QWidget) -> QDockWidget | None:
-    """Find the dock that holds a widget."""
-    parent = widget
-    while parent is not None and not isinstance(parent, QDockWidget):
-        parent = parent.parentWidget()
-    return parent
-
-
-def docks_at_right(window: QMainWindow) -> list[QDockWidget]:
-    """Return the docks in sight at the right of a window."""
-    return [
-        dock
-        for dock in window.findChildren(QDockWidget)
-        if window.dockWidgetArea(dock) == RIGHT and dock.isVisible() and not dock.isFloating()
-    ]
-
-
 def trace_widgets(viewer: Any) -> list[TraceWidget]:
     """Return the trace widgets that a viewer's window has, hidden ones too."""
     docked = viewer.window.dock_widgets
@@ -285,8 +264,10 @@ def show_traces(viewer: Any, visible: bool = True) -> None:
         there = {type(widget): widget for widget in widgets}
         for name, kind in _WIDGETS.items():
             widget = there.get(kind) or _dock(viewer, name, kind)
-            cast(QDockWidget, find_dock(widget)).show()
+            dock = cast(QDockWidget, find_dock(widget))
+            dock.show()
             widget.place()
+            dock.raise_()
         return
     docks = [cast(QDockWidget, find_dock(widget)) for widget in widgets]
     windows = {find_window(widget) for widget in widgets}
