@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -150,3 +152,20 @@ def test_both_frames_are_saved_as_they_are_while_side_by_side(scene, qtbot, tmp_
         first, second = (np.asarray(Image.open(tmp_path / f / name)) for f in ("one", "two"))
         assert np.array_equal(first, second)
         assert first.std() > 0
+
+
+@pytest.mark.needs_gl
+def test_a_program_may_end_with_its_window_open():
+    """Catches widgets that reach for what Qt has already taken away: Python was aborted."""
+    program = """
+import napari
+from qtpy.QtTest import QTest
+viewer = napari.Viewer()
+for name in ("simulator", "sources", "exposure time", "monitoring", "row trace"):
+    viewer.window.add_plugin_dock_widget("napari-issis", f"ISSIS {name}")
+    QTest.qWait(100)
+"""
+    command = [sys.executable, "-W", "ignore", "-c", program]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert "Traceback" not in ended.stderr
+    assert ended.returncode == 0, ended.stderr

@@ -25,7 +25,7 @@ from ..observation import Observation
 from .goal_plot import GoalCurve, GoalPlot
 from .instrument_form import style_warning
 from .number_field import NumberField
-from .panels import find_dock, place_soon, share_place
+from .panels import find_dock, place_soon, share_place, widths_at_right
 from .push_button import push_button
 from .scene import open_scene
 from .scene_forecast import SceneForecast
@@ -93,6 +93,8 @@ class GoalPanel(QWidget):  # type: ignore[misc]
         self.seconds: float | None = None
         self._shown_kind = "snr"
         self._following = self._placed = False
+        # before napari makes room for this one
+        self._beside = widths_at_right(napari_viewer)
         self.kind.currentIndexChanged.connect(self._kind_changed)
         self.target.changed.connect(self.show_answer)
         self.forecast.changed.connect(self.show_answer)
@@ -196,7 +198,7 @@ class GoalPanel(QWidget):  # type: ignore[misc]
         dock = find_dock(self)
         if dock is not None and not self._placed:
             self._placed = True
-            place_soon(self, share_place)
+            place_soon(self, share_place, self._beside)
             # a tab behind another one gets no event
             dock.visibilityChanged.connect(self._follow)
 

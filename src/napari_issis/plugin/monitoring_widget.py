@@ -26,7 +26,7 @@ from .curves_window import CurvesWindow
 from .latest_wins import LatestWins
 from .monitoring_form import MonitoringForm
 from .monitoring_layer import show_monitoring
-from .panels import place_soon, share_place
+from .panels import place_soon, share_place, widths_at_right
 from .push_button import push_button
 from .scene import open_scene
 from .writer import fits_path
@@ -77,6 +77,8 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
         self._jobs = LatestWins(self._done, self._failed)
         self._wanted = 0
         self._placed = False
+        # before napari makes room for this one
+        self._beside = widths_at_right(napari_viewer)
         self.told.connect(self._show_progress)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(4, 2, 4, 4)
@@ -152,7 +154,7 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
         super().showEvent(event)
         if not self._placed:
             self._placed = True
-            place_soon(self, share_place)
+            place_soon(self, share_place, self._beside)
 
     def _start(self, job: Callable[[Monitoring, Tell], Any], then: Callable[[Any], None]) -> None:
         try:

@@ -58,15 +58,26 @@ def find_dock(widget: QWidget) -> QDockWidget | None:
     return parent
 
 
-def place_soon(widget: QWidget, place: Callable[[QMainWindow, QDockWidget], None]) -> None:
+def widths_at_right(viewer: Any) -> dict[QDockWidget, int]:
+    """Return the docks in sight at the right of a viewer's window, and their widths."""
+    for widget in viewer.window.dock_widgets.values():
+        if (window := find_window(widget)) is not None:
+            return {dock: dock.width() for dock in docks_at_right(window)}
+    return {}
+
+
+def place_soon(
+    widget: QWidget,
+    place: Callable[[QMainWindow, QDockWidget], None],
+    widths: dict[QDockWidget, int],
+) -> None:
     """Move the dock of a widget that is being shown, when that can be done: after it is shown.
 
-    The docks at the right keep the width that they had before.
+    Other docks get back the widths that they had before: `widths_at_right` then.
     """
     window, dock = find_window(widget), find_dock(widget)
     if window is None or dock is None:
         return
-    widths = {other: other.width() for other in docks_at_right(window) if other is not dock}
 
     def move() -> None:
         # the window may have been closed meanwhile

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,8 @@ class SceneForecast(QObject):  # type: ignore[misc]
 
     def pause(self) -> None:
         """Make none any more."""
-        self._timer.stop()
+        with suppress(RuntimeError):  # Qt has gone where a program ends with its window open
+            self._timer.stop()
         self._jobs.cancel()
 
     def _request(self) -> None:

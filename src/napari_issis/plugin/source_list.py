@@ -31,7 +31,7 @@ from superqt.utils import qthrottled
 from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
 from .cell_editors import CellEditors
 from .list_forecast import ListForecast, with_forecast
-from .panels import find_dock, place_at_bottom, place_soon
+from .panels import find_dock, place_at_bottom, place_soon, widths_at_right
 from .photometry_dialog import PhotometryDialog
 from .push_button import push_button
 from .reader import tell_notes
@@ -127,6 +127,8 @@ class SourceList(QWidget):  # type: ignore[misc]
         self.model.refused.connect(self._tell_refused)
         self._photometry: PhotometryDialog | None = None
         self._following = self._selecting = self._placed = False
+        # before napari makes room for this one
+        self._beside = widths_at_right(napari_viewer)
         self._soon = qthrottled(self.refresh, timeout=REST)
 
     # ---------------------------------------------------------------- list and layers
@@ -280,7 +282,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         dock = find_dock(self)
         if dock is not None and not self._placed:
             self._placed = True
-            place_soon(self, place_at_bottom)
+            place_soon(self, place_at_bottom, self._beside)
             # a tab behind another one gets no event
             dock.visibilityChanged.connect(self._follow)
 

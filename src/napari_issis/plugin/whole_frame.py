@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,8 @@ class WholeFrame:
         viewer.canvas.events.size.disconnect(self._resized)
         for event in (viewer.scene.camera.events.zoom, viewer.scene.camera.events.center):
             event.disconnect(self._moved)
-        self._settled.stop()
+        with suppress(RuntimeError):  # Qt has gone where a program ends with its window open
+            self._settled.stop()
 
     @property
     def is_whole(self) -> bool:
