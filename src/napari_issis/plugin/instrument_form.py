@@ -84,7 +84,7 @@ class InstrumentForm(Form):
         self.new_noise = PushButton(text="&New noise", tooltip="Draw the noise anew (next seed)")
         self.add("Came&ra", self.camera)
         # in a row of its own, the band can be read
-        self.add("C&hannel", self.channel)
+        self.add("Channel", self.channel)
         self.sky_model = ComboBox(
             choices=_skies(scene.observation),
             tooltip="Sky: the paper's constants (CIS), HST's levels, or that of a high orbit",

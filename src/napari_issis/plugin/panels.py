@@ -60,7 +60,8 @@ def find_dock(widget: QWidget) -> QDockWidget | None:
 
 def widths_at_right(viewer: Any) -> dict[QDockWidget, int]:
     """Return the docks in sight at the right of a viewer's window, and their widths."""
-    for widget in viewer.window.dock_widgets.values():
+    window = getattr(viewer, "window", None)  # a viewer model has none
+    for widget in [] if window is None else window.dock_widgets.values():
         if (window := find_window(widget)) is not None:
             return {dock: dock.width() for dock in docks_at_right(window)}
     return {}
