@@ -60,6 +60,7 @@ class SceneForecast(QObject):  # type: ignore[misc]
         self.source_id = np.empty(0, dtype=np.int64)
         self._compute, self._needs = compute, needs
         self._made_for: object = None
+        self._asked_for: object = None
         self._jobs = LatestWins(self._deliver, self._failed)
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
@@ -77,7 +78,7 @@ class SceneForecast(QObject):  # type: ignore[misc]
 
     def follow(self) -> None:
         """Make a forecast of the scene as it is now, soon."""
-        if self.pending:
+        if self.pending and self._asked_for != self._now:
             self._timer.start()
 
     def pause(self) -> None:
@@ -85,6 +86,7 @@ class SceneForecast(QObject):  # type: ignore[misc]
         with suppress(RuntimeError):  # Qt has gone where a program ends with its window open
             self._timer.stop()
         self._jobs.cancel()
+        self._asked_for = None
 
     def _request(self) -> None:
         scene = self.scene
@@ -100,6 +102,7 @@ class SceneForecast(QObject):  # type: ignore[misc]
                 f"{len(sources):,}. In a script napari_issis.forecast makes them."
             )
             return
+        self._asked_for = now
         self._jobs.request(lambda: (now, source_id, compute(sources, observation)))
 
     def _deliver(self, made: tuple[object, Any, Any]) -> None:
