@@ -159,6 +159,10 @@ def test_labels_of_the_colour_bar_are_counts(scene, form, scale):
     limits, sky = scene.counts.limits, scene.exposure.background
     for place, label in ticks:
         assert stretched(scale, float(label), limits, sky) == pytest.approx(place, abs=0.006)
+    if scale not in ("log", "snr"):
+        # rounded up, the label of the upper limit stays
+        scene.counts.set_limits((0.0, 721.6))
+        assert form.bar.ticks()[-1] == (1.0, "722")
 
 
 def test_magnitudes_beside_the_logarithm(scene, form):

@@ -364,7 +364,7 @@ def test_labels_lead_to_their_fields(form):
     keys = [
         label.text().split("&")[1][0] for label in form.findChildren(QLabel) if "&" in label.text()
     ]
-    assert sorted(keys) == sorted(set(keys)) == ["K", "M", "b", "d", "s"]
+    assert sorted(keys) == sorted(set(keys)) == ["K", "M", "U", "b", "d"]
     assert all(label.buddy() is not None for label in form.findChildren(QLabel))
     assert all(label.toolTip() for label in form.findChildren(QLabel))
 

@@ -78,13 +78,15 @@ class ColorBar(QWidget):  # type: ignore[misc]
         low, high = counts.limits
         if counts.effective_scale == "log":
             values = _decades(max(low, 1e-3), high)
+            values = values[(values >= low) & (values <= high)]
         else:
             scale = counts.effective_scale
             middle = counts_at(scale, np.linspace(0, 1, 6), (low, high), counts.background)
             values = np.array([_round(value) for value in middle])
-        places = stretched(counts.effective_scale, values, (low, high), counts.background)
-        inside = (values >= low) & (values <= high)
-        return [(float(p), f"{v:.6g}") for p, v in zip(places[inside], values[inside], strict=True)]
+        # rounded, the limits themselves may lie outside
+        within = np.clip(values, low, high)
+        places = stretched(counts.effective_scale, within, (low, high), counts.background)
+        return [(float(p), f"{v:.6g}") for p, v in zip(places, values, strict=True)]
 
     def magnitude_ticks(self) -> list[tuple[float, str]]:
         """Places and labels of surface brightnesses, AB mag arcsec-2, above the sky.

@@ -95,7 +95,7 @@ class SourceForm(Form):
 
     def _make_choices(self) -> None:
         self.flux_unit = ComboBox(
-            choices=[("Fλ (cgs)", "flux"), ("AB mag", "AB mag")],
+            choices=[("Fλ cgs", "flux"), ("AB mag", "AB mag")],
             tooltip="Show and type fluxes in erg s⁻¹ cm⁻² Å⁻¹, or as AB magnitudes "
             "at the channel's pivot wavelength",
         )
