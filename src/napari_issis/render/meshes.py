@@ -27,6 +27,9 @@ from .threads import alongside
 LARGEST_DISC = 400.0
 # share of the error allowed that each Gaussian may take where it is cut or sampled
 SHARE = 0.02
+# Meshes of fewer points are transformed by one thread: the others would have to be woken, or are
+# at work on the fine mesh.
+FEWEST_FOR_THREADS = 2e6
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
@@ -292,6 +295,7 @@ class _Mesh:
             )
         self.axes = (axes[0], axes[1])
         self.shape = (axes[0].count, axes[1].count)
+        self.workers = -1 if np.prod(self.shape) >= FEWEST_FOR_THREADS else 1
         start = (axes[0].start, axes[1].start)
         self.plain_mesh: Array | None = None
         self.low_mesh: Array | None = None
@@ -320,7 +324,7 @@ class _Mesh:
         spectrum: Spectrum | None = None
         onward: Spectrum | None = None
         if self.low_mesh is not None:
-            transformed = fft.rfft2(self.low_mesh, workers=-1)
+            transformed = fft.rfft2(self.low_mesh, workers=self.workers)
             self.low_mesh = None  # the largest array of all
             spectrum = transformed * self._filter(spread=True)
             if not self.last:
@@ -329,7 +333,7 @@ class _Mesh:
                 transformed *= more_x
                 onward = transformed
         if self.plain_mesh is not None:
-            transformed = fft.rfft2(self.plain_mesh, workers=-1)
+            transformed = fft.rfft2(self.plain_mesh, workers=self.workers)
             filtered = transformed * self._filter(spread=False)
             spectrum = filtered if spectrum is None else spectrum + filtered
             if not self.last:
@@ -338,7 +342,7 @@ class _Mesh:
                 transformed *= next_x
                 onward = transformed if onward is None else onward + transformed
         if self.large_mesh is not None:
-            filtered = fft.rfft2(self.large_mesh, workers=-1) * self._filter(spread=True)
+            filtered = fft.rfft2(self.large_mesh, workers=self.workers) * self._filter(spread=True)
             spectrum = filtered if spectrum is None else spectrum + filtered
         assert spectrum is not None
         return spectrum, onward
@@ -354,7 +358,7 @@ class _Mesh:
 
     def rate(self, spectrum: Spectrum) -> Array:
         """Contribution at the mesh points of the frame."""
-        values = fft.irfft2(spectrum, self.shape, workers=-1)
+        values = fft.irfft2(spectrum, self.shape, workers=self.workers)
         index = []
         for axis, count in zip(self.axes, self.shape, strict=True):
             begin = round(axis.start / self.cell)
@@ -365,7 +369,7 @@ class _Mesh:
     def pass_on(self, onward: Spectrum) -> Density:
         """Density for the next level, spread for it and sampled on its mesh."""
         ny, nx = self.shape
-        density = fft.irfft2(fold(onward, ny, nx), (ny // 2, nx // 2), workers=-1)
+        density = fft.irfft2(fold(onward, ny, nx), (ny // 2, nx // 2), workers=self.workers)
         room = 2 * self.plan.spread() * self.cell * self.plan.cut()
         index, intervals = [], []
         for axis in self.axes:
