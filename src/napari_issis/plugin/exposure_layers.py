@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from napari.types import LayerDataTuple
-from qtpy.QtWidgets import QMessageBox
+from qtpy.QtWidgets import QApplication, QMessageBox
 
 from ..exposure import Exposure
 from . import layer_styles as styles
@@ -83,6 +83,9 @@ def adopt_layers(viewer: Any) -> None:
 def may_replace(count: int) -> bool:
     """Ask whether the sources of the present scene may go; undo brings them back."""
     answer = QMessageBox.question(
-        None, "Open", f"Replace the {count} source(s) of the present scene by those opened?"
+        QApplication.activeWindow(),
+        "Open",
+        f"Replace the {count} source(s) of the present scene by those opened? Undo brings them "
+        "back.",
     )
     return bool(answer == QMessageBox.StandardButton.Yes)
