@@ -84,8 +84,7 @@ class _Breach:
     observation: Observation
 
     def at_length(self) -> list[str]:
-        camera = self.observation.instrument
-        detector = camera.limits_note or f"the detector of {camera.name}"
+        detector = self._detector
         local_limit, total_limit = self.limits
         messages = []
         if self.total > total_limit:
@@ -108,8 +107,7 @@ class _Breach:
 
     def of_a_sequence(self) -> list[str]:
         """Name the limits alone: the same words for all exposures that break them."""
-        camera = self.observation.instrument
-        detector = camera.limits_note or f"the detector of {camera.name}"
+        detector = self._detector
         local_limit, total_limit = self.limits
         messages = []
         if self.total > total_limit:
@@ -134,6 +132,11 @@ class _Breach:
         else:
             text = f"Too bright: {self.total:.3g} cps in all (limit {total_limit:.0e})."
         return f"{text} {self._cure().removeprefix('The neutral filter ')}"
+
+    @property
+    def _detector(self) -> str:
+        camera = self.observation.instrument
+        return camera.limits_note or f"the detector of {camera.name}"
 
     def _cure(self) -> str:
         local_limit, total_limit = self.limits

@@ -84,12 +84,8 @@ def write_png(
     -----
     Scale, limits, colormap and zoom stand in the file as PNG text.
     """
-    picture, (low, high) = image_picture(
-        image, scale=scale, limits=limits, colormap=colormap, zoom=zoom
-    )
-    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
-    if isinstance(colormap, str):
-        text["Colormap"] = colormap
+    picture, limits = image_picture(image, scale=scale, limits=limits, colormap=colormap, zoom=zoom)
+    text = _drawn_by(scale, limits, colormap, zoom)
     _save(picture, path, text | (words or {}), overwrite=overwrite)
 
 
@@ -233,19 +229,24 @@ def write_side_by_side_png(
     -----
     A grey line of `GAP` PNG pixels parts the two.
     """
-    right, (low, high) = image_picture(
-        image, scale=scale, limits=limits, colormap=colormap, zoom=zoom
-    )
+    right, limits = image_picture(image, scale=scale, limits=limits, colormap=colormap, zoom=zoom)
     ny, nx = np.shape(image)
     check_zoom(zoom, (ny, 2 * nx + GAP))
     left = source_picture(sources, (ny, nx), zoom=zoom, pixel_scale=pixel_scale)
     both = Image.new("RGB", (2 * left.width + GAP, left.height), GAP_COLOR)
     both.paste(left, (0, 0))
     both.paste(right, (left.width + GAP, 0))
-    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
-    if isinstance(colormap, str):
-        text["Colormap"] = colormap
+    text = _drawn_by(scale, limits, colormap, zoom)
     _save(both, path, text | (words or {}), overwrite=overwrite)
+
+
+def _drawn_by(
+    scale: str, limits: tuple[float, float], colormap: str | NDArray[np.uint8], zoom: int
+) -> dict[str, str]:
+    """Return how an image is drawn, as PNG text."""
+    low, high = limits
+    text = {"Scale": scale, "Limits": f"{low!r} {high!r}", "Zoom": str(zoom)}
+    return text | ({"Colormap": colormap} if isinstance(colormap, str) else {})
 
 
 def _rectangle(image: str, r_half: float, pa: float) -> NDArray[np.float64]:
