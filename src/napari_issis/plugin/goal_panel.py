@@ -25,7 +25,7 @@ from ..observation import Observation
 from .goal_plot import GoalCurve, GoalPlot
 from .instrument_form import style_warning
 from .number_field import NumberField
-from .panels import find_dock, place_soon, share_place, widths_at_right
+from .panels import FirstPlace, follow, share_place
 from .push_button import push_button
 from .scene import open_scene
 from .scene_forecast import SceneForecast
@@ -92,9 +92,8 @@ class GoalPanel(QWidget):  # type: ignore[misc]
         layout.addWidget(self.button)
         self.seconds: float | None = None
         self._shown_kind = "snr"
-        self._following = self._placed = False
-        # before napari makes room for this one
-        self._beside = widths_at_right(napari_viewer)
+        self._following = False
+        self._place = FirstPlace(self, napari_viewer, share_place)
         self.kind.currentIndexChanged.connect(self._kind_changed)
         self.target.changed.connect(self.show_answer)
         self.forecast.changed.connect(self.show_answer)
@@ -195,10 +194,7 @@ class GoalPanel(QWidget):  # type: ignore[misc]
         """Follow the scene while visible (napari gives docked widgets no close event)."""
         self._follow(True)
         super().showEvent(event)
-        dock = find_dock(self)
-        if dock is not None and not self._placed:
-            self._placed = True
-            place_soon(self, share_place, self._beside)
+        if (dock := self._place.take()) is not None:
             # a tab behind another one gets no event
             dock.visibilityChanged.connect(self._follow)
 
@@ -212,17 +208,14 @@ class GoalPanel(QWidget):  # type: ignore[misc]
             return
         self._following = self.forecast.on = on
         events = self.scene.events
-        for emitter, slot in (
+        pairs = (
             (events.sources, self._scene_changed),
             (events.observation, self._scene_changed),
             (events.picture, self._scene_changed),
             (events.selection, self.show_answer),
             (self.scene.viewer.events.theme, self.show_answer),
-        ):
-            if on:
-                emitter.connect(slot)
-            else:
-                emitter.disconnect(slot)
+        )
+        follow(pairs, on)
         if on:
             self._scene_changed()
         else:

@@ -26,7 +26,7 @@ from .curves_window import CurvesWindow
 from .latest_wins import LatestWins
 from .monitoring_form import MonitoringForm
 from .monitoring_layer import show_monitoring
-from .panels import place_soon, share_place, widths_at_right
+from .panels import FirstPlace, share_place
 from .push_button import push_button
 from .scene import open_scene
 from .writer import fits_path
@@ -76,9 +76,7 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
         self.curves: CurvesWindow | None = None
         self._jobs = LatestWins(self._done, self._failed)
         self._wanted = 0
-        self._placed = False
-        # before napari makes room for this one
-        self._beside = widths_at_right(napari_viewer)
+        self._place = FirstPlace(self, napari_viewer, share_place)
         self.told.connect(self._show_progress)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(4, 2, 4, 4)
@@ -152,9 +150,7 @@ class MonitoringWidget(QWidget):  # type: ignore[misc]
     def showEvent(self, event: QShowEvent) -> None:
         """Take a place when shown first."""
         super().showEvent(event)
-        if not self._placed:
-            self._placed = True
-            place_soon(self, share_place, self._beside)
+        self._place.take()
 
     def _start(self, job: Callable[[Monitoring, Tell], Any], then: Callable[[Any], None]) -> None:
         try:

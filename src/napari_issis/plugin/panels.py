@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Any
 
@@ -67,27 +67,55 @@ def widths_at_right(viewer: Any) -> dict[QDockWidget, int]:
     return {}
 
 
-def place_soon(
-    widget: QWidget,
-    place: Callable[[QMainWindow, QDockWidget], None],
-    widths: dict[QDockWidget, int],
-) -> None:
-    """Move the dock of a widget that is being shown, when that can be done: after it is shown.
+class FirstPlace:
+    """Gives a widget's dock its place when it is shown first.
 
-    Other docks get back the widths that they had before: `widths_at_right` then.
+    Parameters
+    ----------
+    widget : QWidget
+        The widget, not docked yet.
+    viewer : napari.Viewer
+        The viewer that will dock it.
+    place : callable
+        Moves the dock in its window.
     """
-    window, dock = find_window(widget), find_dock(widget)
-    if window is None or dock is None:
-        return
 
-    def move() -> None:
-        # the window may have been closed meanwhile
-        with suppress(RuntimeError):
-            if not dock.isFloating():
-                place(window, dock)
-                window.resizeDocks(list(widths), list(widths.values()), Qt.Orientation.Horizontal)
+    def __init__(
+        self, widget: QWidget, viewer: Any, place: Callable[[QMainWindow, QDockWidget], None]
+    ) -> None:
+        self._widget, self._place, self._taken = widget, place, False
+        # before napari makes room for this one
+        self._widths = widths_at_right(viewer)
 
-    QTimer.singleShot(0, move)
+    def take(self) -> QDockWidget | None:
+        """Move the dock as soon as it has been shown; return it, the first time.
+
+        Other docks get back the widths that they had before.
+        """
+        window, dock = find_window(self._widget), find_dock(self._widget)
+        if window is None or dock is None or self._taken:
+            return None
+        self._taken = True
+
+        def move() -> None:
+            # the window may have been closed meanwhile
+            with suppress(RuntimeError):
+                if not dock.isFloating():
+                    self._place(window, dock)
+                    docks, widths = list(self._widths), list(self._widths.values())
+                    window.resizeDocks(docks, widths, Qt.Orientation.Horizontal)
+
+        QTimer.singleShot(0, move)
+        return dock
+
+
+def follow(pairs: Iterable[tuple[Any, Callable[..., Any]]], on: bool) -> None:
+    """Connect slots to the emitters of napari events, or disconnect them."""
+    for emitter, slot in pairs:
+        if on:
+            emitter.connect(slot)
+        else:
+            emitter.disconnect(slot)
 
 
 def docks_at_right(window: QMainWindow) -> list[QDockWidget]:

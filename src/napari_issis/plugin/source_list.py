@@ -31,7 +31,7 @@ from superqt.utils import qthrottled
 from ..catalogue import READABLE, SUFFIXES, read_catalogue, write_sources
 from .cell_editors import CellEditors
 from .list_forecast import ListForecast, with_forecast
-from .panels import find_dock, place_at_bottom, place_soon, widths_at_right
+from .panels import FirstPlace, follow, place_at_bottom
 from .photometry_dialog import PhotometryDialog
 from .push_button import push_button
 from .reader import tell_notes
@@ -126,9 +126,8 @@ class SourceList(QWidget):  # type: ignore[misc]
         self.view.selectionModel().selectionChanged.connect(self._rows_selected)
         self.model.refused.connect(self._tell_refused)
         self._photometry: PhotometryDialog | None = None
-        self._following = self._selecting = self._placed = False
-        # before napari makes room for this one
-        self._beside = widths_at_right(napari_viewer)
+        self._following = self._selecting = False
+        self._place = FirstPlace(self, napari_viewer, place_at_bottom)
         self._soon = qthrottled(self.refresh, timeout=REST)
 
     # ---------------------------------------------------------------- list and layers
@@ -279,10 +278,7 @@ class SourceList(QWidget):  # type: ignore[misc]
         """Follow the scene while visible (napari gives docked widgets no close event)."""
         self._follow(True)
         super().showEvent(event)
-        dock = find_dock(self)
-        if dock is not None and not self._placed:
-            self._placed = True
-            place_soon(self, place_at_bottom, self._beside)
+        if (dock := self._place.take()) is not None:
             # a tab behind another one gets no event
             dock.visibilityChanged.connect(self._follow)
 
@@ -296,17 +292,14 @@ class SourceList(QWidget):  # type: ignore[misc]
             return
         self._following = on
         events = self.scene.events
-        for emitter, slot in (
+        pairs = (
             (events.sources, self._sources_changed),
             (events.observation, self._sources_changed),
             (events.picture, self._sources_changed),
             (events.selection, self._show_selection),
             (self.scene.units.events.changed, self._sources_changed),
-        ):
-            if on:
-                emitter.connect(slot)
-            else:
-                emitter.disconnect(slot)
+        )
+        follow(pairs, on)
         if on:
             self.refresh()
         else:
