@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..sources import SourceArrays
+from .compiled_painting import Painter
 from .discs import disc_half_sizes, paint_discs, paint_large_discs
 from .gaussians import Gaussians
 from .interpolation import Span, add_up, spans
 from .near import paint_near
 from .optics import Transfer
-from .painting import half_patch, half_patches, paint
+from .painting import half_patch, half_patches, paint, scene_painter
 from .plan import BAND, Plan
 from .rings import Band, band_transfer
 from .spreading import FEWEST_CUT_DIGITS, spread_cut
@@ -72,6 +73,7 @@ class _Content:
     large: SourceArrays
     large_rate: Array
     passed: Density | None
+    compiled: Painter | None
 
 
 def mesh_rate(
@@ -121,11 +123,12 @@ def mesh_rate(
     top = max(int(level_of.max(initial=0)), int(disc_level.max(initial=0)))
     while _wings(plan, top, shape, total) > 0.03 * allowed or plan.cuts_rings(top):
         top += 1
+    compiled = scene_painter(digits)
     near_image: Callable[[], Array] | None = None
     close = _outside(shape, discs.y, discs.x, disc_half_sizes(discs)) <= plan.reach(-1)
     if plan.near == "mesh" and (near.any() or close.any() or len(large)):
         sharp = (gaussians.take(near), digits[near], discs.take(close), disc_rate[close])
-        near_image = alongside(paint_near(plan, shape, *sharp, large, large_rate))
+        near_image = alongside(paint_near(plan, shape, *sharp, large, large_rate, compiled))
     results: list[Array | None] = []
     passed: Density | None = None
     for level, frame in enumerate(spans(plan, shape, top + 1)):
@@ -145,6 +148,7 @@ def mesh_rate(
                 large=large,
                 large_rate=large_rate,
                 passed=passed,
+                compiled=compiled,
             ),
         )
         if mesh.empty:
@@ -307,10 +311,10 @@ class _Mesh:
             )
         if len(plain):
             self.plain_mesh = np.zeros(self.shape)
-            paint(self.plain_mesh, start, self.cell, plain, 0.0, cut_plain)
+            paint(self.plain_mesh, start, self.cell, plain, 0.0, cut_plain, content.compiled)
         if len(spread) or len(discs) or passed is not None:
             self.low_mesh = np.zeros(self.shape)
-            paint(self.low_mesh, start, self.cell, spread, sigma, cut_spread)
+            paint(self.low_mesh, start, self.cell, spread, sigma, cut_spread, content.compiled)
             paint_discs(
                 self.low_mesh, start, self.cell, discs, content.disc_rate, sigma, plan.digits
             )

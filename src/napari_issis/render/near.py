@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..sources import SourceArrays
+from .compiled_painting import Painter
 from .discs import disc_half_sizes, paint_discs, paint_large_discs
 from .fine_mesh import NEAR_UNIT, FineMesh, fine_meshes
 from .folding import fold_half, fold_rows
@@ -63,6 +64,7 @@ def paint_near(
     disc_rate: Array,
     large: SourceArrays,
     large_rate: Array,
+    compiled: Painter | None,
 ) -> Callable[[], Array]:
     """Paint the fine meshes; the function returned transforms them.
 
@@ -81,6 +83,8 @@ def paint_near(
         they lie on the mesh.
     disc_rate, large_rate : ndarray
         Their count rates.
+    compiled : callable or None
+        What paints (`scene_painter`).
 
     Returns
     -------
@@ -94,7 +98,7 @@ def paint_near(
     """
     image: Array | None = None
     *first, last = fine_meshes(plan)
-    parts = (gaussians, digits, discs, disc_rate, large, large_rate)
+    parts = (gaussians, digits, discs, disc_rate, large, large_rate, compiled)
     for mesh in first:
         part = _at_pixels(*_painted(mesh, shape, *parts), shape)
         image = part if image is None else image + part
@@ -117,6 +121,7 @@ def _painted(
     disc_rate: Array,
     large: SourceArrays,
     large_rate: Array,
+    compiled: Painter | None,
 ) -> tuple[Array, Axis, Axis, Transfer]:
     """Rows of one fine mesh, its axes and its filter."""
     plan = mesh.plan
@@ -136,7 +141,7 @@ def _painted(
     rows = np.zeros((y.painted, 2 * (x.count // 2 + 1)), mesh.dtype)
     points = rows[:, : x.painted]
     start, cell, spread = (float(y.start), float(x.start)), mesh.cell, mesh.spread
-    paint(points, start, cell, gaussians, spread, cut)
+    paint(rows, start, cell, gaussians, spread, cut, compiled)
     paint_discs(points, start, cell, discs, disc_rate, spread, mesh.digits)
     if len(large):
         paint_large_discs(points, start, cell, large, large_rate, spread, mesh.digits)

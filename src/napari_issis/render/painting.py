@@ -8,7 +8,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from .compiled_painting import Painter, painter
 from .gaussians import Gaussians
+from .threads import blocks, for_each
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -17,6 +19,14 @@ Indices = NDArray[np.intp]
 BATCH = 32768
 # sides of the painted patches are rounded up to a multiple of this, so that many are alike
 STEP = 6
+# points of a scene from which on compiled code paints: with fewer, loading it takes longer than it
+# saves in a hundred images
+FEWEST_COMPILED = 1e6
+# rows of a mesh that it paints at a time
+ROWS = 128
+# How much fainter than asked for a Gaussian is where it ends, a natural logarithm: it paints
+# ellipses, which are cut all around, where patches are cut in four places.
+RIM = 1.0
 
 
 def paint(
@@ -26,13 +36,14 @@ def paint(
     gaussians: Gaussians,
     spread: float,
     cut: float | Array,
+    compiled: Painter | None,
 ) -> None:
     """Add Gaussians to a mesh of densities (cps per pixel area).
 
     Parameters
     ----------
     mesh : ndarray, shape (ny, nx)
-        The mesh; every Gaussian must lie on it as far as `half_patches` tells.
+        The mesh, contiguous; every Gaussian must lie on it as far as `half_patches` tells.
     start : (float, float)
         Position (y, x) of the mesh's first point, pixels.
     cell : float
@@ -43,32 +54,64 @@ def paint(
         Standard deviation in pixels of a Gaussian by which each is widened.
     cut : float or ndarray, shape (n,)
         Distance in standard deviations beyond which a Gaussian may be left out.
+    compiled : callable or None
+        What `scene_painter` gives for the whole scene: an image must not depend on what was
+        painted before it.
     """
     if not len(gaussians):
         return
     xx, yy, xy = gaussians.xx + spread**2, gaussians.yy + spread**2, gaussians.xy
     y = (gaussians.y - start[0]) / cell
     x = (gaussians.x - start[1]) / cell
-    half_y, half_x = half_patches(yy, cell, cut), half_patches(xx, cell, cut)
+    determinant = xx * yy - xy**2
+    with np.errstate(divide="ignore"):
+        log_height = np.log(np.abs(gaussians.rate) / (2 * np.pi * np.sqrt(determinant)))
+    # exponent a dy^2 + b dy dx + c dx^2 + log height, dy and dx in cells
+    a = -0.5 * cell**2 * xx / determinant
+    b = cell**2 * xy / determinant
+    c = -0.5 * cell**2 * yy / determinant
+    if compiled is None:
+        half_y, half_x = half_patches(yy, cell, cut), half_patches(xx, cell, cut)
+        _paint_patches(mesh, y, x, half_y, half_x, a, b, c, log_height, gaussians.rate < 0)
+    else:
+        depth = np.broadcast_to(0.5 * np.square(cut) + RIM, y.shape).copy()
+        values = (y, x, a, b, c, log_height, np.sign(gaussians.rate), depth)
+        for_each(
+            lambda rows: compiled(mesh, rows.start, rows.stop, *values), blocks(len(mesh), ROWS)
+        )
+
+
+def scene_painter(digits: Array) -> Painter | None:
+    """Return compiled code for Gaussians of some accuracies, where there is any and it pays.
+
+    Parameters
+    ----------
+    digits : ndarray
+        Natural logarithms of the accuracies.
+    """
+    # A point spread on a mesh takes so many of the mesh's points.
+    return painter() if 10 * float(np.sum(digits**2)) >= FEWEST_COMPILED else None
+
+
+def _paint_patches(
+    mesh: Array,
+    y: Array,
+    x: Array,
+    half_y: Indices,
+    half_x: Indices,
+    a: Array,
+    b: Array,
+    c: Array,
+    log_height: Array,
+    negative: NDArray[np.bool_],
+) -> None:
+    """Add exp(a dy^2 + b dy dx + c dx^2 + log_height) to a mesh, dy and dx from (y, x)."""
     order = np.lexsort((half_x, half_y))
     row, column = np.rint(y), np.rint(x)
-    determinant = xx * yy - xy**2
-    rate = gaussians.rate
-    with np.errstate(divide="ignore"):
-        log_height = np.log(np.abs(rate) / (2 * np.pi * np.sqrt(determinant)))
-    # exponent a dy^2 + b dy dx + c dx^2 + log height, dy and dx in cells
     a, b, c, log_height, dy, dx = (
-        values[order, None]
-        for values in (
-            -0.5 * cell**2 * xx / determinant,
-            cell**2 * xy / determinant,
-            -0.5 * cell**2 * yy / determinant,
-            log_height,
-            y - row,
-            x - column,
-        )
+        values[order, None] for values in (a, b, c, log_height, y - row, x - column)
     )
-    half_y, half_x, negative = half_y[order], half_x[order], rate[order] < 0
+    half_y, half_x, negative = half_y[order], half_x[order], negative[order]
     top = (row[order].astype(np.intp) - half_y).tolist()
     left = (column[order].astype(np.intp) - half_x).tolist()
     for batch in _batches(half_y, half_x):
