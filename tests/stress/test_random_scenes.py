@@ -1,15 +1,19 @@
 """The promised tolerance over random scenes: all kinds, PSFs and tolerances mixed."""
 
 import numpy as np
+import pytest
 from plain_scene import CPS, PIXEL, psf_of, table_of
 from random_scene import exact_rate, promised_error, random_scene
 
 import napari_issis as ni
+from napari_issis.render import painting
 
 
-def test_tolerance_is_kept(scene_seed):
+@pytest.mark.parametrize("fewest", [0.0, np.inf], ids=["compiled", "plain"])
+def test_tolerance_is_kept(scene_seed, fewest, monkeypatch):
     """Catches a kernel cut too short, a coarse filter, a wrong bound where sources of very
     different brightness or size meet, an aperture that is refused."""
+    monkeypatch.setattr(painting, "FEWEST_COMPILED", fewest)
     scene = random_scene(scene_seed)
     observation = ni.Observation(shape=scene.shape, psf=psf_of(*scene.psf))
     image = ni.count_rate(table_of(scene.sources), observation, tolerance=scene.tolerance)
