@@ -1,4 +1,4 @@
-"""Run time on one core and on several, each in a process of its own (Linux).
+"""Run time on one core and on several, without numba and with it, each in its own process (Linux).
 
 ``python cores.py [scene ...]`` prints a table. A process is bound to so many cores before it
 imports anything, so that all libraries in it know of no more.
@@ -21,24 +21,28 @@ def main(scenes: list[str]) -> None:
     """Print the table, times as medians over calls that each see a new table."""
     available = len(os.sched_getaffinity(0))
     counts = sorted({1, min(2, available), min(8, available)})
-    print("| scene | tolerance |", " | ".join(f"{n} cores: ms" for n in counts), "| ratio |")
-    print("|---" * (len(counts) + 3) + "|")
+    cases = [(n, numba) for n in counts for numba in ("without", "with")]
+    heads = (f"{n} core{'s' * (n > 1)}, {numba} numba: ms" for n, numba in cases)
+    print("| scene | tolerance |", " | ".join(heads), "|")
+    print("|---" * (len(cases) + 2) + "|")
     for scene in scenes:
-        columns = [_times(scene, n) for n in counts]
+        columns = [_times(scene, *case) for case in cases]
         for tolerance, *row in zip(TOLERANCES, *columns, strict=True):
             cells = " | ".join(f"{1e3 * seconds:.0f}" for seconds in row)
-            print(f"| {scene} | {tolerance:.0e} | {cells} | {row[0] / row[-1]:.2f} |")
+            print(f"| {scene} | {tolerance:.0e} | {cells} |")
 
 
-def _times(scene: str, cores: int) -> list[float]:
-    command = [sys.executable, "-W", "ignore", __file__, "--one", scene, str(cores)]
+def _times(scene: str, cores: int, numba: str) -> list[float]:
+    command = [sys.executable, "-W", "ignore", __file__, "--one", scene, str(cores), numba]
     printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return [float(line) for line in printed.split()]
 
 
-def one(scene: str, cores: int) -> None:
+def one(scene: str, cores: int, numba: str) -> None:
     """Print the seconds at each tolerance on some cores."""
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
+    if numba == "without":
+        sys.modules["numba"] = None  # type: ignore[assignment]  # as if it were not installed
     from napari_issis import count_rate
     from speed_scenes import load_scene, moved
 
@@ -56,6 +60,6 @@ def one(scene: str, cores: int) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
-        one(sys.argv[2], int(sys.argv[3]))
+        one(sys.argv[2], int(sys.argv[3]), sys.argv[4])
     else:
         main(sys.argv[1:] or list(SCENES))

@@ -7,7 +7,7 @@ import platform
 from importlib.metadata import version
 from pathlib import Path
 
-PACKAGES = ("napari-issis", "numpy", "scipy", "galsim", "photutils")
+PACKAGES = ("napari-issis", "numpy", "scipy", "numba", "galsim", "photutils")
 
 
 def machine() -> str:
