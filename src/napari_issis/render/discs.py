@@ -9,8 +9,12 @@ from scipy import fft, special
 from ..sources import SourceArrays
 from .profiles import disc_transform
 from .spreading import spread_cut
+from .threads import blocks, for_each
 
 Array = NDArray[np.float64]
+
+# ellipses painted by all threads before they are added to the mesh
+TOGETHER = 16
 
 
 def elliptical_frequency(
@@ -59,7 +63,9 @@ def paint_discs(
     accuracy = min(3e3 * np.exp(-1.75 * digits), 0.02 * np.exp(-digits))
     half_y, half_x = disc_half_sizes(discs)
 
-    for i in range(len(discs)):
+    patches: dict[int, tuple[int, int, Array]] = {}
+
+    def transform(i: int) -> None:
         n_y, first_y = _patch(discs.y[i], half_y[i] + cut * spread, start[0], cell)
         n_x, first_x = _patch(discs.x[i], half_x[i] + cut * spread, start[1], cell)
         ky, kx = fft.fftfreq(n_y, cell), fft.rfftfreq(n_x, cell)
@@ -71,8 +77,13 @@ def paint_discs(
         factor_y *= rate[i] / cell**2
         spectrum = disc_transform(q, accuracy) * factor_y[:, None]
         spectrum *= factor_x
-        patch = fft.irfft2(spectrum, (n_y, n_x), overwrite_x=True)
-        mesh[first_y : first_y + n_y, first_x : first_x + n_x] += patch
+        patches[i] = first_y, first_x, fft.irfft2(spectrum, (n_y, n_x), overwrite_x=True)
+
+    for some in blocks(len(discs), TOGETHER):
+        for_each(transform, range(len(discs))[some])
+        for i in range(len(discs))[some]:  # in the same order whoever was first
+            y, x, patch = patches.pop(i)
+            mesh[y : y + len(patch), x : x + patch.shape[1]] += patch
 
 
 def paint_large_discs(
