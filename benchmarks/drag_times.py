@@ -1,4 +1,7 @@
-"""Time single-source moves: ``python drag_times.py [--quick]`` prints one line of JSON."""
+"""Time moves and edits of a single source.
+
+``python drag_times.py [--quick]`` prints one line of JSON.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,7 @@ import galsim
 import numpy as np
 from astropy.table import QTable, vstack
 
-import napari_issis
-from napari_issis import Observation, TelescopePSF, count_rate, source
+from napari_issis import Drag, Observation, TelescopePSF, count_rate, source
 from renderer_galsim import convolved, galsim_psf, profiles
 from speed_scenes import EXTENDED, FIELD, field, load_scene
 
@@ -39,26 +41,36 @@ def _drag(kind: str, others: QTable, observation: Observation, moves: int) -> di
     path = np.linspace(0.3 * side, 0.7 * side, moves)
     result: dict[str, Any] = {"kind": kind, "side": side, "others": len(others), "moves": moves}
     result |= _galsim_ms(source(kind, path[0], path[0], r_half=30.0), observation)
-    maker = getattr(napari_issis, "Drag", None)
-    if maker is None:
-        return result
     moving = [source(kind, x, 0.5 * side + 0.1 * (x - path[0]), r_half=30.0) for x in path]
     start = perf_counter()
-    drag = maker(vstack([others, moving[0]]), observation, [len(others)], tolerance=TOLERANCE)
+    drag = Drag(vstack([others, moving[0]]), observation, [len(others)], tolerance=TOLERANCE)
     result["start_ms"] = 1e3 * (perf_counter() - start)
-    times = []
-    for table in moving:
-        start = perf_counter()
-        drag.move(table)
-        rate = drag.rate
-        times.append(1e3 * (perf_counter() - start))
+    times = _times(drag, moving)
+    rate = drag.rate.copy()
     full = count_rate(vstack([others, moving[-1]]), observation, tolerance=FINAL_TOLERANCE)
-    error = float(np.abs(np.asarray(rate) - full).max() / full.max())
+    error = float(np.abs(rate - full).max() / full.max())
+    if kind != "point":
+        sizes, angles = np.linspace(10.0, 30.0, moves), np.linspace(0.0, 90.0, moves)
+        edited = [
+            source(kind, path[0], 0.5 * side, r_half=r, ellipticity=0.3, pa=pa)
+            for r, pa in zip(sizes, angles, strict=True)
+        ]
+        result["edited_ms"] = float(np.median(_times(drag, edited)))
     return result | {
         "median_ms": float(np.median(times)),
         "max_ms": float(np.max(times)),
         "error": error,
     }
+
+
+def _times(drag: Drag, tables: list[QTable]) -> list[float]:
+    """Milliseconds that each of some moves takes."""
+    times = []
+    for table in tables:
+        start = perf_counter()
+        drag.move(table)
+        times.append(1e3 * (perf_counter() - start))
+    return times
 
 
 def _galsim_ms(table: QTable, observation: Observation) -> dict[str, float]:

@@ -8,12 +8,12 @@ import sys
 
 import numpy as np
 import pytest
-from test_reference_images import load
 
 import napari_issis as ni
 from napari_issis.render import painting
 from napari_issis.render.compiled_painting import painter
 from napari_issis.render.gaussians import ellipse
+from test_reference_images import load
 
 CELL, SPREAD, CUT = 0.4, 0.7, 8.0
 SHAPE = (301, 403)

@@ -25,14 +25,14 @@ def elliptical_frequency(
     Frequencies in cycles per pixel, ``pa`` in degrees.
     """
     sin, cos = np.sin(np.radians(pa)), np.cos(np.radians(pa))
-    along = (ky * cos)[:, None] - (kx * sin)[None, :]
-    across = (ky * sin)[:, None] + (kx * cos)[None, :]
+    major = 2 * np.pi * r_half
+    minor = major * (1 - ellipticity)
+    along = (major * cos * ky)[:, None] - major * sin * kx
+    across = (minor * sin * ky)[:, None] + minor * cos * kx
     along *= along
     across *= across
-    across *= (1 - ellipticity) ** 2
     along += across
     q: Array = np.sqrt(along, out=along)
-    q *= 2 * np.pi * r_half
     return q
 
 

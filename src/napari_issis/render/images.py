@@ -248,7 +248,7 @@ def _density(image: SourceImage, pa: float, limit: float) -> tuple[Array, float]
     gaussians = ellipse(x, y, weight, width, width, np.zeros_like(width))
     half = [int(np.ceil((np.abs(p).max() + CUT) / cell)) + 8 for p in (y, x)]
     mesh = np.zeros((2 * half[0] + 1, 2 * half[1] + 1))
-    compiled = scene_painter(np.full_like(weight, 0.5 * CUT**2))
+    compiled = scene_painter(gaussians, np.full_like(weight, 0.5 * CUT**2))
     paint(mesh, (-half[0] * cell, -half[1] * cell), cell, gaussians, 0.0, CUT, compiled)
     mesh *= cell**2
     return mesh, cell

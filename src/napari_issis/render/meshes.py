@@ -123,7 +123,7 @@ def mesh_rate(
     top = max(int(level_of.max(initial=0)), int(disc_level.max(initial=0)))
     while _wings(plan, top, shape, total) > 0.03 * allowed or plan.cuts_rings(top):
         top += 1
-    compiled = scene_painter(digits)
+    compiled = scene_painter(gaussians, digits)
     near_image: Callable[[], Array] | None = None
     close = _outside(shape, discs.y, discs.x, disc_half_sizes(discs)) <= plan.reach(-1)
     if plan.near == "mesh" and (near.any() or close.any() or len(large)):

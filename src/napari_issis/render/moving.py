@@ -6,6 +6,8 @@ the source is moved, only the phases change.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
@@ -17,7 +19,7 @@ from .direct import has_sharp_edge
 from .discs import disc_half_sizes
 from .folding import fold_half, fold_rows
 from .images import image_gaussians
-from .optics import Optics
+from .optics import Optics, Transfer
 from .profiles import sersic_value
 from .stamps import needed_limit, on_axes, transform
 from .windows import Window, overlap, place
@@ -29,6 +31,11 @@ MOST_MODES = 4_000_000
 # share of the light allowed to be missing that each of three omissions may take: beyond the
 # window, above the highest frequency, and wrapped around
 SHARE = 0.4
+# Windows and highest frequencies grow in steps of this ratio, so that a source that is resized or
+# turned finds the transfer function of a moment ago.
+STEP = 1.07
+# transfer functions of no more values than this are kept
+MOST_KEPT = 250_000
 
 
 class MovingSource:
@@ -57,11 +64,13 @@ class MovingSource:
         limit: float,
     ) -> None:
         self.half = half
-        self.period = tuple(int(fft.next_fast_len(2 * h + 1, real=True)) for h in half)
+        y, x = (int(fft.next_fast_len(2 * h + 1, real=True)) for h in half)
+        self.period = y, x
         my, mx = (int(limit * period) for period in self.period)
         self.ky = np.concatenate([np.arange(my + 1), np.arange(-my, 0)]) / self.period[0]
         self.kx = np.arange(mx + 1) / self.period[1]
-        spectrum = optics.transfer(self.ky, self.kx) * rate
+        make = _transfer if self.ky.size * self.kx.size <= MOST_KEPT else _transfer.__wrapped__
+        spectrum = make(optics, my, mx, self.period) * rate
         if one.kind[0] != "point":
             spectrum = spectrum * transform(one, self.ky, self.kx)
         self.spectrum = spectrum
@@ -78,6 +87,17 @@ class MovingSource:
         columns = fft.ifft(fold_rows(turned[:upper], turned[upper:], self.period[0]), axis=0)[:ny]
         own = fft.irfft(fold_half(columns, self.period[1]), self.period[1], axis=1)[:, :nx]
         return place(image, own, row, column)
+
+
+@lru_cache(maxsize=32)
+def _transfer(optics: Optics, my: int, mx: int, period: tuple[int, int]) -> Transfer:
+    """Transfer function at frequencies 0 to my, -my to -1, and 0 to mx, over the periods."""
+    kx = np.arange(mx + 1) / period[1]
+    upper = np.arange(my + 1) / period[0]
+    if not optics.radial:
+        return optics.transfer(np.concatenate([upper, -upper[:0:-1]]), kx)
+    quadrant = optics.transfer(upper, kx)
+    return np.concatenate([quadrant, quadrant[:0:-1]])
 
 
 def moving_source(
@@ -101,12 +121,17 @@ def moving_source(
     if has_sharp_edge(optics, allowed / rate, optics.extent + 50.0, 1.0):
         return None
     share = SHARE * allowed
-    half = half_sizes(optics, one, rate, share)
-    limit = highest_frequency(optics, one, rate, share)
+    high, wide = half_sizes(optics, one, rate, share)
+    half = int(_step_up(high)), int(_step_up(wide))
+    limit = _step_up(highest_frequency(optics, one, rate, share))
     modes = 8 * half[0] * half[1] * limit**2
     if modes > MOST_MODES or half[0] > shape[0] or half[1] > shape[1]:
         return None
     return MovingSource(optics, one, rate, half, limit)
+
+
+def _step_up(value: float) -> float:
+    return float(STEP ** np.ceil(np.log(value) / np.log(STEP)))
 
 
 def half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> tuple[int, int]:

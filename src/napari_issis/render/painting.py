@@ -19,9 +19,11 @@ Indices = NDArray[np.intp]
 BATCH = 32768
 # sides of the painted patches are rounded up to a multiple of this, so that many are alike
 STEP = 6
-# points of a scene from which on compiled code paints: with fewer, loading it takes longer than it
-# saves in a hundred images
-FEWEST_COMPILED = 1e6
+# Work from which on compiled code paints, in mesh points of stars: with less, loading it takes
+# longer than it saves in some forty images. Gaussians of all sizes take numpy so many times as
+# long as points, which are alike and are painted many at a time.
+FEWEST_COMPILED = 4e6
+UNLIKE = 5.0
 # rows of a mesh that it paints at a time
 ROWS = 128
 # How much fainter than asked for a Gaussian is where it ends, a natural logarithm: it paints
@@ -81,16 +83,20 @@ def paint(
         )
 
 
-def scene_painter(digits: Array) -> Painter | None:
-    """Return compiled code for Gaussians of some accuracies, where there is any and it pays.
+def scene_painter(gaussians: Gaussians, digits: Array) -> Painter | None:
+    """Return compiled code for a scene's Gaussians, where there is any and it pays.
 
     Parameters
     ----------
+    gaussians : Gaussians
+        All that will be painted.
     digits : ndarray
-        Natural logarithms of the accuracies.
+        Natural logarithms of their accuracies.
     """
-    # A point spread on a mesh takes so many of the mesh's points.
-    return painter() if 10 * float(np.sum(digits**2)) >= FEWEST_COMPILED else None
+    # points that a point takes on a mesh, spread and cut as the accuracy asks for
+    points = 10 * digits**2
+    work = float(np.sum(np.where(gaussians.major > 0, UNLIKE, 1.0) * points))
+    return painter() if work >= FEWEST_COMPILED else None
 
 
 def _paint_patches(
