@@ -26,9 +26,9 @@ FEWEST_COMPILED = 4e6
 UNLIKE = 5.0
 # rows of a mesh that it paints at a time
 ROWS = 128
-# How much fainter than asked for a Gaussian is where it ends, a natural logarithm: it paints
-# ellipses, which are cut all around, where patches are cut in four places.
-RIM = 1.0
+# How much fainter than asked for a Gaussian is where it ends, a natural logarithm: ellipses are cut
+# all around, patches in four places only and with sides rounded up.
+RIM = 4.0
 
 
 def paint(
