@@ -124,8 +124,21 @@ assert ni.count_rate(table, tolerance=1e-8).max() > 0
 assert painter() is None
 """
 
+# what numba says where neither the package nor the user's directory can be written
+NO_PLACE = """
+import numba
+def njit(*args, **options):
+    raise RuntimeError("cannot cache function '_paint_rows': no locator available")
+numba.njit = njit
+import napari_issis as ni
+from napari_issis.render.compiled_painting import painter
+assert painter() is None
+"""
 
-@pytest.mark.parametrize("code", [SMALL, MISSING], ids=["small scene", "numba is missing"])
+
+@pytest.mark.parametrize(
+    "code", [SMALL, MISSING, NO_PLACE], ids=["small scene", "numba is missing", "no directory"]
+)
 def test_numba_is_not_needed(code):
     """Catches half a second spent on a scene that gains a millisecond, and a crash without it."""
     subprocess.run([sys.executable, "-c", code], check=True)
