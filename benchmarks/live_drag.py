@@ -91,7 +91,7 @@ def watch(scene: Scene) -> tuple[list[float], list[float]]:
 
     def timed_preview(*args: Any) -> Any:
         start = perf_counter()
-        result = preview(scene._maker, *args)
+        result = preview(scene._live._maker, *args)
         previews.append(perf_counter() - start)
         return result
 
@@ -100,7 +100,7 @@ def watch(scene: Scene) -> tuple[list[float], list[float]]:
         take_over()
         held.append(perf_counter() - start)
 
-    setattr(scene._maker, "preview", timed_preview)  # noqa: B010
+    setattr(scene._live._maker, "preview", timed_preview)  # noqa: B010
     setattr(scene.editor, "take_over", timed_take_over)  # noqa: B010
     return previews, held
 

@@ -78,7 +78,7 @@ def scene(viewer: ViewerModel) -> Scene:
 
 
 def _idle(scene: Scene) -> None:
-    while scene._jobs.busy:
+    while scene._live._jobs.busy:
         QApplication.processEvents()
 
 

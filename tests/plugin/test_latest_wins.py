@@ -64,7 +64,7 @@ def change():
     close_when_busy()
 
 def close_when_busy():
-    if scene._jobs.busy:
+    if scene._live._jobs.busy:
         scene.viewer.close()
         print("closed while busy", flush=True)
     else:

@@ -296,5 +296,5 @@ def test_whatever_the_monkey_does(viewer, mouse, qtbot, seed):
     assert not [text for text in errors if "Traceback" in text or "could not be sim" in text]
     listed.hide()
     scene.viewer.layers.clear()
-    while scene._jobs.busy:
+    while scene._live._jobs.busy:
         QApplication.processEvents()

@@ -11,7 +11,7 @@ from small_scene import few_sources
 
 from napari_issis import simulate
 from napari_issis.plugin.dock import SimulatorWidget
-from napari_issis.plugin.scene import SLOW
+from napari_issis.plugin.live_picture import SLOW
 
 pytestmark = pytest.mark.filterwarnings("ignore::napari_issis.CountRateWarning")
 
@@ -28,13 +28,13 @@ def panel(scene, qtbot):
 @pytest.fixture
 def gate(scene, monkeypatch):
     """Holds every picture back until it is set."""
-    gate, final = threading.Event(), scene._maker.final
+    gate, final = threading.Event(), scene._live._maker.final
 
     def slow(*arguments):
         gate.wait(20)
         return final(*arguments)
 
-    monkeypatch.setattr(scene._maker, "final", slow)
+    monkeypatch.setattr(scene._live._maker, "final", slow)
     yield gate
     gate.set()
 
@@ -72,7 +72,7 @@ def test_a_picture_that_is_cancelled(scene, panel, gate, qtbot):
     assert scene.cancelled
     assert panel.progress.button.text() == "Simulate"
     gate.set()
-    qtbot.waitUntil(lambda: not scene._jobs.busy, timeout=3000)
+    qtbot.waitUntil(lambda: not scene._live._jobs.busy, timeout=3000)
     # what happens at each selection
     scene._soon()
     QTest.qWait(SLOW + 50)

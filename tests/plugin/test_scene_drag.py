@@ -158,7 +158,7 @@ def test_preview_renders_only_what_moves(scene, mouse, monkeypatch):
     for step in range(1, 7):
         mouse.move(20.25 + step, 12.5)
         scene._refresh()
-        while scene._jobs.busy:
+        while scene._live._jobs.busy:
             QApplication.processEvents()
         previews.append(scene.counts.layer.data.copy())
         assert not scene.picture.final
@@ -195,7 +195,7 @@ def test_exposure_seed_and_neutral_filters_render_nothing(scene, monkeypatch):
 def test_what_is_no_edit_asks_for_no_picture(scene, monkeypatch, qtbot):
     """Catches pictures made because of zooming, hiding, selecting and sizes of points."""
     asked = []
-    monkeypatch.setattr(scene._jobs, "request", asked.append)
+    monkeypatch.setattr(scene._live._jobs, "request", asked.append)
     points = scene.editor.points.layer
     points.visible = False
     points.visible = True

@@ -379,7 +379,7 @@ def test_closing_in_the_middle_of_a_render(scene, qtbot):
     scene.sources = few_sources()[:2]
     scene._refresh()
     scene.viewer.layers.clear()
-    qtbot.waitUntil(lambda: not scene._jobs.busy, timeout=5000)
+    qtbot.waitUntil(lambda: not scene._live._jobs.busy, timeout=5000)
     assert len(scene.viewer.layers) == 0
 
 

@@ -57,7 +57,7 @@ def galaxies(viewer):
     scene.wait()
     yield scene
     viewer.layers.clear()
-    while scene._jobs.busy:
+    while scene._live._jobs.busy:
         QApplication.processEvents()
 
 

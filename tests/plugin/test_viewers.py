@@ -35,7 +35,7 @@ def other(scene, mouse, qapp):
     second.wait()
     yield second, type(mouse)(viewer)
     viewer.layers.clear()
-    while second._jobs.busy:
+    while second._live._jobs.busy:
         QApplication.processEvents()
 
 
@@ -112,16 +112,16 @@ def test_closed_in_the_middle_of_a_render(make_napari_viewer, monkeypatch, qtbot
     scene = panel.scene
     scene.sources, scene.observation = few_sources(), SMALL
     scene.wait()
-    gate, final = threading.Event(), scene._maker.final
-    monkeypatch.setattr(scene._maker, "final", lambda *args: gate.wait(20) and final(*args))
+    gate, final = threading.Event(), scene._live._maker.final
+    monkeypatch.setattr(scene._live._maker, "final", lambda *args: gate.wait(20) and final(*args))
     scene.new_noise()
-    qtbot.waitUntil(lambda: scene._jobs.busy)
+    qtbot.waitUntil(lambda: scene._live._jobs.busy)
     if what == "widget":
         viewer.window.remove_dock_widget(panel)
     else:
         viewer.layers.clear()
     gate.set()
-    qtbot.waitUntil(lambda: not scene._jobs.busy, timeout=5000)
+    qtbot.waitUntil(lambda: not scene._live._jobs.busy, timeout=5000)
     # pytest-qt fails the test for an error in a slot
     QTest.qWait(100)
     # that of the autosave ends as well

@@ -104,7 +104,7 @@ def test_a_click_renders_nothing(calm, mouse, qtbot, renders):
     QApplication.processEvents()
     mouse.release(20.25, 12.5)
     calm.wait()
-    qtbot.waitUntil(lambda: not calm._jobs.busy, timeout=5000)
+    qtbot.waitUntil(lambda: not calm._live._jobs.busy, timeout=5000)
     assert renders == []
     mouse.drag((20.25, 12.5), (30.0, 15.0))
     calm.wait()
@@ -115,7 +115,7 @@ def test_a_scene_without_layers_makes_no_pictures(calm, qtbot, monkeypatch):
     """Whoever deletes the three layers has stopped the simulation, until a script asks for it."""
     calm.viewer.layers.clear()
     # what was asked for before the last layer went may still be drawn
-    qtbot.waitUntil(lambda: not calm._jobs.busy)
+    qtbot.waitUntil(lambda: not calm._live._jobs.busy)
     qtbot.wait(50)
     drawn = watch(monkeypatch, poisson_quantile.poisson_quantile)
     calm.observation = calm.observation.replace(channel="FUV")

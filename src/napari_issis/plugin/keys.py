@@ -8,7 +8,7 @@ from typing import Any
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QLabel, QVBoxLayout, QWidget
 
-from .scene import DELETE_KEYS, FINE_STEP, KIND_KEY
+from .layer_keys import DELETE_KEYS, FINE_STEP, KIND_KEY
 from .trace_docks import FREEZE_KEY
 from .zoom import FIT_KEY, KEYS
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, cast
 from weakref import WeakValueDictionary
 
@@ -11,7 +11,7 @@ import numpy as np
 from astropy.table import QTable, Table
 from napari.layers import Image
 from napari.utils.events import EmitterGroup, Event
-from napari.utils.notifications import show_error, show_info
+from napari.utils.notifications import show_info
 from napari.viewer import Viewer
 from qtpy.QtCore import QEventLoop, QTimer
 from qtpy.QtWidgets import QApplication
@@ -22,9 +22,10 @@ from ..source_rates import rates_per_flux
 from ..sources import IMAGE, KINDS, source
 from .counts_layer import CountsLayer
 from .editor import SourceEditor
-from .latest_wins import LatestWins
+from .layer_keys import LayerKeys
+from .live_picture import LivePicture, SceneNow
 from .marks import MARKER
-from .picture import HeldSources, Picture, PictureMaker
+from .picture import Picture
 from .pointer import Pointer
 from .source_columns import of_kind
 from .table import master_table, put
@@ -33,19 +34,10 @@ from .units import Units
 # The live scene of each viewer, kept alive by its pointer in the viewer's mouse callbacks.
 _SCENES: WeakValueDictionary[int, Scene] = WeakValueDictionary()
 
-# A drag that rests for so long (ms) is shown as it will be when it ends.
-PAUSE = 200
 # When a zoom rests for so long (ms), the ellipses' edges are drawn as thin as before.
 ZOOM_PAUSE = 80
-# A picture that is not there after so long (ms) is slow.
-SLOW = 300
 # Key presses with no more than this (ms) between them are one nudge.
 BURST = 600
-# Arrow keys: a pixel to the right and up; with Shift a part of it.
-ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Down": (0, -1), "Up": (0, 1)}
-FINE_STEP = 0.1
-KIND_KEY = "Shift-K"
-DELETE_KEYS = ("Delete", "Backspace")
 # Row 0 at the bottom and x to the right, as astronomers expect.
 ORIENTATION = ("up", "right")
 
@@ -94,15 +86,10 @@ class Scene:
         self._orientation = viewer.scene.camera.orientation2d
         self._told = False
 
-        self._maker = PictureMaker()
-        self._jobs = LatestWins(self._show, self._failed)
-        self._picture: Picture | None = None
-        self._error: BaseException | None = None
+        self._live = LivePicture(self._now, self._shows, self._show, self.events.progress)
         self._set_up = 0
         self._told_version = 0
         self._told_missing: tuple[str, ...] = ()
-        self._requested: tuple[Any, bool] = (None, False)
-        self._shown: tuple[Any, bool] = (None, False)
         self._timer = QTimer()
         self._timer.setSingleShot(True)
         self._timer.timeout.connect(self._refresh)
@@ -111,17 +98,7 @@ class Scene:
         self._zoomed.setInterval(ZOOM_PAUSE)
         self._zoomed.timeout.connect(self._follow_zoom)
         viewer.scene.camera.events.zoom.connect(self._zoom_changed)
-        self._pause = QTimer()
-        self._pause.setSingleShot(True)
-        self._pause.setInterval(PAUSE)
-        self._pause.timeout.connect(self._request_final)
-        self._has_arrows = False
-        self._slow = False
-        self._cancelled: Any = None
-        self._patience = QTimer()
-        self._patience.setSingleShot(True)
-        self._patience.setInterval(SLOW)
-        self._patience.timeout.connect(self._be_slow)
+        self._keys = LayerKeys(self)
         self._burst = QTimer()
         self._burst.setSingleShot(True)
         self._burst.setInterval(BURST)
@@ -211,44 +188,40 @@ class Scene:
     def exposure(self) -> Exposure:
         """The exposure of the scene as it is now; waits until it is made."""
         self.wait()
-        assert self._picture is not None
-        return self._picture.exposure
+        assert self.picture is not None
+        return self.picture.exposure
 
     @property
     def picture(self) -> Picture | None:
         """What is on the screen now; None before the first exposure."""
-        return self._picture
+        return self._live.picture
 
     @property
     def settled(self) -> bool:
         """Whether the picture is that of the scene as it is now, and no preview."""
-        return not self._timer.isActive() and self._shown == (self._version, True)
+        return not self._timer.isActive() and self._live.settled
 
     @property
     def slow(self) -> bool:
         """Whether a picture is being made and takes long."""
-        return self._slow
+        return self._live.slow
 
     @property
     def cancelled(self) -> bool:
         """Whether the picture of the scene as it is now was cancelled: an older one is shown."""
-        return bool(self._cancelled == self._version)
+        return self._live.cancelled
 
     def cancel(self) -> None:
         """Keep the picture that is shown; the scene is simulated at its next change.
 
         What is being computed runs on to its end in the background; its result is dropped.
         """
-        if self._jobs.busy:
-            self._jobs.cancel()
-            self._cancelled, self._requested = self._version, (None, False)
-            self._watch()
+        self._live.cancel()
 
     def simulate(self) -> None:
         """Simulate the scene after all, if that was cancelled."""
         if self.cancelled:
-            self._cancelled = None
-            self.events.progress()
+            self._live.resume()
             self._soon()
 
     def new_noise(self) -> None:
@@ -369,10 +342,9 @@ class Scene:
         self._refresh()
         until = time.monotonic() + timeout
         while not self.settled:
-            if self._error is not None and not self._jobs.busy:
-                raise RuntimeError(
-                    f"the scene could not be simulated: {self._error}"
-                ) from self._error
+            error = self._live.error
+            if error is not None:
+                raise RuntimeError(f"the scene could not be simulated: {error}") from error
             if time.monotonic() > until:
                 raise TimeoutError(f"the scene was not simulated within {timeout:g} s.")
             QApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 10)
@@ -428,7 +400,7 @@ class Scene:
         for layer in self.editor.layers:
             self.editor.listen(layer)
         for layer in self.layers:
-            self._bind_keys(layer)
+            self._keys.bind(layer)
         self.observation, self.seed = exposure.observation, exposure.seed
         self.sources = exposure.sources
 
@@ -451,10 +423,10 @@ class Scene:
             self._orient()
         if self.counts.layer is None and all_layers:
             observation = self._observation
-            image = self.counts.make(observation.shape, observation.pixel_scale, self._picture)
+            image = self.counts.make(observation.shape, observation.pixel_scale, self.picture)
             place = min((layers.index(above) for above in self.editor.layers), default=len(layers))
             layers.insert(place, image)
-            self._bind_keys(image)
+            self._keys.bind(image)
         with self.editor.quiet():
             for view in self.editor.views:
                 needed = all_layers or view.holds(self.editor.sources["kind"]).any()
@@ -465,7 +437,7 @@ class Scene:
                     below = view is self.editor.ellipses and points is not None
                     layers.insert(layers.index(points) if below else len(layers), view.layer)
                     self.editor.listen(view.layer)
-                    self._bind_keys(view.layer)
+                    self._keys.bind(view.layer)
         if new:
             self.viewer.reset_view(layers=[self.counts.layer])
         elif active is not None and layers.selection.active is not active:
@@ -474,36 +446,9 @@ class Scene:
             layers.selection.update(selected)
             layers.selection.active = active
 
-    def _bind_keys(self, layer: Any) -> None:
-        """Bind our keys on a layer of ours: those of the viewer belong to the user."""
-        layer.bind_key("Control-Z", self.undo, overwrite=True)
-        layer.bind_key("Control-Shift-Z", self.redo, overwrite=True)
-        layer.bind_key(KIND_KEY, self.next_kind, overwrite=True)
-        for key in DELETE_KEYS:
-            layer.bind_key(key, self._remove_selected, overwrite=True)
-        self._bind_arrows(layer)
-
-    def _remove_selected(self, layer: Any) -> None:
-        """Remove what is selected on either layer; napari would on the active one alone."""
-        if not getattr(layer, "_is_creating", False):
-            self.remove(self.editor.selected_ids)
-
-    def _bind_arrows(self, layer: Any) -> None:
-        """Let the arrow keys move the selected sources; without any they are napari's."""
-        for key, (right, up) in ARROWS.items():
-            for modifier, step in (("", 1.0), ("Shift-", FINE_STEP)):
-
-                def move(_: Any, right: float = step * right, up: float = step * up) -> None:
-                    self.nudge(right, up)
-
-                layer.bind_key(modifier + key, move if self._has_arrows else None, overwrite=True)
-
     def _selected(self) -> None:
         self.editor.end_nudge()
-        if self._has_arrows != bool(self.editor.selected_ids):
-            self._has_arrows = not self._has_arrows
-            for layer in self.layers:
-                self._bind_arrows(layer)
+        self._keys.follow_selection()
         self.events.selection()
 
     def _fit_marks(self) -> None:
@@ -546,9 +491,16 @@ class Scene:
 
     # ---------------------------------------------------------------- from scene to image
 
-    @property
-    def _version(self) -> tuple[int, int]:
-        return self.editor.version, self._set_up
+    def _now(self) -> SceneNow:
+        editor = self.editor
+        return SceneNow(
+            version=(editor.version, self._set_up),
+            sources=editor.sources,
+            source_id=editor.source_id,
+            observation=self._observation,
+            seed=self._seed,
+            held=editor.held,
+        )
 
     def _soon(self) -> None:
         """Look once, when napari has done with what it is doing."""
@@ -564,73 +516,17 @@ class Scene:
         if self._told_missing != self.missing:
             self._told_missing = self.missing
             self.events.missing()
-        held = self.editor.held
-        if not self.layers:
-            self._jobs.drop()
-        elif held is None:
-            self._pause.stop()
-            self._request_final()
-        elif self._requested[0] != self._version:
-            self._pause.stop()
-            self._request_preview(held)
-
-    def _request_final(self) -> None:
-        ticket = (self._version, True)
-        asked = self._requested == ticket
-        if self.cancelled or (
-            asked and (self._jobs.busy or self._shown == ticket or self._error is not None)
-        ):
-            return
-        maker = self._maker
-        sources, observation, seed = self.editor.sources, self._observation, self._seed
-
-        def job() -> tuple[Any, Picture]:
-            return ticket, maker.final(sources, observation, seed)
-
-        self._request(ticket, job)
-
-    def _request_preview(self, held: HeldSources) -> None:
-        ticket = (self._version, False)
-        maker, editor = self._maker, self.editor
-        sources, source_id = editor.sources, editor.source_id
-        observation, seed = self._observation, self._seed
-
-        def job() -> tuple[Any, Picture]:
-            return ticket, maker.preview(held, sources, source_id, observation, seed)
-
-        self._request(ticket, job)
-
-    def _request(self, ticket: Any, job: Callable[[], Any]) -> None:
-        self._requested, self._error = ticket, None
-        if self._cancelled is not None:
-            self._cancelled = None
-            self.events.progress()
-        self._jobs.request(job)
-        if not self._slow and not self._patience.isActive():
-            self._patience.start()
-
-    def _be_slow(self) -> None:
-        if self._jobs.busy and not self.cancelled:
-            self._slow = True
-            self.events.progress()
-
-    def _watch(self) -> None:
-        """Begin to wait for the next picture, if there is to be one."""
-        if self._jobs.busy and not self.cancelled:
-            self._patience.start()
+        if self.layers:
+            self._live.follow()
         else:
-            self._patience.stop()
-        if self._slow or self.cancelled:
-            self._slow = False
-            self.events.progress()
+            self._live.drop()
 
-    def _show(self, result: tuple[Any, Picture]) -> None:
-        self._watch()
-        # also while a window is being closed, which takes the layers away one by one
-        if not self.layers or any(layer not in self.viewer.layers for layer in self.layers):
-            return
-        self._shown, picture = result
-        previous, self._picture = self._picture, picture
+    def _shows(self) -> bool:
+        """Whether all layers are there: a window that is closed takes them away one by one."""
+        layers = self.layers
+        return bool(layers) and all(layer in self.viewer.layers for layer in layers)
+
+    def _show(self, picture: Picture, previous: Picture | None) -> None:
         self.counts.show(picture)
         shape = picture.exposure.counts.shape
         if (
@@ -642,16 +538,6 @@ class Scene:
         self.events.shown()
         if picture.final:
             self.events.picture()
-            return
-        if self._shown[0] == self._version:
-            # The mouse rests: when it does so for long, show what the drag would end with.
-            self._pause.start()
-
-    def _failed(self, error: BaseException) -> None:
-        # The last good picture stays.
-        self._watch()
-        self._error = error
-        show_error(f"The scene could not be simulated: {error}")
 
 
 def scene_of(viewer: Any) -> Scene | None:
