@@ -58,7 +58,9 @@ def measure(chosen: str | None, *, quick: bool, full: bool) -> dict[str, Any]:
         "quick": quick,
         "scenes": {},
         "checks": {},
+        "digits": {},
     }
+    flags = ("--quick",) if quick else ()
     with tempfile.TemporaryDirectory() as folder:
         for scene in SCENES if chosen is None else (chosen,):
             rows = measure_scene(points(scene, quick=quick, full=full), Path(folder))
@@ -66,9 +68,9 @@ def measure(chosen: str | None, *, quick: bool, full: bool) -> dict[str, Any]:
             for row in rows:
                 row.pop("image", None)
             results["scenes"][scene] = rows
+            results["digits"][scene] = run_json("digits_cost.py", scene, *flags)
     results["floor"] = {str(side): fft_pair_seconds(side) for side in (512, 2048)}
     if chosen is None:
-        flags = ("--quick",) if quick else ()
         print("drags", flush=True)
         results["drags"] = run_json("drag_times.py", *flags)
         print("scaling", flush=True)
