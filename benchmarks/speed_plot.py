@@ -22,7 +22,7 @@ LABELS = {
     "galsim": ((0, 6), "center"),
     "galsim_sum": ((-6, -3), "right"),
     "photutils": ((6, -3), "left"),
-    "pixel_grid": ((0, -12), "center"),
+    "pixel_grid": ((0, 6), "center"),
 }
 
 
@@ -48,7 +48,7 @@ def plot(results: dict[str, Any], path: Path) -> None:
 def _panel(axis: Axes, rows: list[dict[str, Any]]) -> None:
     axis.set_xscale("log")
     axis.set_yscale("log")
-    axis.set_xlim(1e-12, 30)
+    axis.set_xlim(2e-13, 30)
     axis.set_xticks([10.0**-d for d in range(0, 13, 3)])
     axis.grid(alpha=0.3)
     ours = [row for row in rows if row["renderer"] == "ours"]
