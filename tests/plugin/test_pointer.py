@@ -89,14 +89,16 @@ def test_moving_the_pointer_shows_the_tooltip(scene, over, qtbot):
 
 
 @pytest.mark.needs_gl
-def test_fingers_and_pens_are_left_to_qt(make_napari_viewer):
+def test_fingers_and_pens_are_left_to_qt(make_napari_viewer, qtbot):
     """Catches a canvas that takes touch events: Qt makes mouse events of those left to it."""
     viewer = make_napari_viewer(show=True)
     panel = SimulatorWidget(viewer)
     viewer.window.add_dock_widget(panel)
     # what is done when it has come to the screen counts too
+    qtbot.waitUntil(panel.isVisible)
     QTest.qWait(200)
     canvas = find_canvas(panel)
+    assert canvas is not None
     while canvas is not None:
         assert not canvas.testAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)
         canvas = canvas.parentWidget()
