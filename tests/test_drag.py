@@ -5,7 +5,8 @@ import pytest
 from astropy.table import vstack
 
 import napari_issis as ni
-from napari_issis.render import moving
+from napari_issis.render import arrays_and_rates, moving
+from napari_issis.render.optics import Optics
 from watching import watch_transforms
 
 SHAPE = (120, 100)
@@ -159,3 +160,27 @@ def test_refusals():
     with pytest.raises(ValueError, match="row 0, x: nan"):
         drag.move(at(table, np.nan, 3.0))
     assert np.array_equal(drag.rate, before)
+
+
+def test_a_source_too_faint_to_be_seen():
+    """Catches the logarithm of a highest frequency of zero."""
+    stars = ni.source("point", 30.0, 40.0, 1e-12)
+    with np.errstate(divide="raise", invalid="raise"):
+        drag = ni.Drag(
+            vstack([stars, ni.source("exponential", 50.0, 60.0, 1e-24)]), OBSERVATION, [1]
+        )
+        drag.move(ni.source("exponential", 51.0, 60.0, 1e-24, r_half=12.0))
+    assert np.abs(drag.rate - drag.rest).max() <= 1e-5 * drag.rest.max()
+
+
+@pytest.mark.parametrize("r_half", [1.0, 1.03, 1.06])
+def test_a_window_that_fills_the_frame_is_still_a_window(r_half):
+    """Catches windows refused for what they are rounded up by, and the frame rendered instead."""
+    optics = Optics(OBSERVATION.effective_psf, OBSERVATION.pixel_scale)
+    table = ni.source("gaussian", 50.0, 60.0, 1e-12, r_half=20.0 * r_half)
+    one, (rate,) = arrays_and_rates(table, OBSERVATION)
+    allowed = 1e-5 * rate
+    half = moving.half_sizes(optics, one, rate, moving.SHARE * allowed)
+    made = moving.moving_source(optics, one, rate, allowed, half)
+    assert made.half[0] >= half[0]
+    assert made.half[1] >= half[1]

@@ -121,17 +121,18 @@ def moving_source(
     if has_sharp_edge(optics, allowed / rate, optics.extent + 50.0, 1.0):
         return None
     share = SHARE * allowed
-    high, wide = half_sizes(optics, one, rate, share)
-    half = int(_step_up(high)), int(_step_up(wide))
-    limit = _step_up(highest_frequency(optics, one, rate, share))
+    half = half_sizes(optics, one, rate, share)
+    limit = highest_frequency(optics, one, rate, share)
     modes = 8 * half[0] * half[1] * limit**2
     if modes > MOST_MODES or half[0] > shape[0] or half[1] > shape[1]:
         return None
-    return MovingSource(optics, one, rate, half, limit)
+    half = int(_step_up(half[0])), int(_step_up(half[1]))
+    return MovingSource(optics, one, rate, half, _step_up(limit))
 
 
 def _step_up(value: float) -> float:
-    return float(STEP ** np.ceil(np.log(value) / np.log(STEP)))
+    """Next power of `STEP`; zero stays zero."""
+    return float(STEP ** np.ceil(np.log(value) / np.log(STEP))) if value > 0 else 0.0
 
 
 def half_sizes(optics: Optics, one: SourceArrays, rate: float, share: float) -> tuple[int, int]:
