@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from napari.utils.notifications import show_error
-from qtpy.QtCore import QTimer
 from qtpy.QtWidgets import QApplication, QHBoxLayout, QLabel, QWidget
 
 from ..autosave import Autosave, CrashedScene, crashed_scenes
 from .latest_wins import LatestWins
 from .push_button import push_button
 from .scene import Scene
+from .single_shot import single_shot
 
 # Milliseconds between an edit and its file.
 DELAY = 3000
@@ -46,10 +46,7 @@ class CrashGuard(QWidget):  # type: ignore[misc]
         self._file: Autosave | None = None
         self._saved = self._version
         self._jobs = LatestWins(lambda _: None, self._failed)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(DELAY)
-        self._timer.timeout.connect(self.save)
+        self._timer = single_shot(self.save, DELAY, self)
         try:
             self._file, self._left = Autosave(), crashed_scenes()
         except (ImportError, OSError) as error:

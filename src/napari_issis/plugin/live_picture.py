@@ -10,11 +10,11 @@ import numpy as np
 from astropy.table import QTable
 from napari.utils.notifications import show_error
 from numpy.typing import NDArray
-from qtpy.QtCore import QTimer
 
 from ..observation import Observation
 from .latest_wins import LatestWins
 from .picture import HeldSources, Picture, PictureMaker
+from .single_shot import single_shot
 
 # A drag that rests for so long (ms) is shown as it will be when it ends.
 PAUSE = 200
@@ -69,8 +69,8 @@ class LivePicture:
         self._requested: tuple[Any, bool] = (None, False)
         self._shown: tuple[Any, bool] = (None, False)
         self._cancelled: Any = None
-        self._pause = _timer(PAUSE, self._request_final)
-        self._patience = _timer(SLOW, self._be_slow)
+        self._pause = single_shot(self._request_final, PAUSE)
+        self._patience = single_shot(self._be_slow, SLOW)
         self.slow = False
 
     @property
@@ -172,11 +172,3 @@ class LivePicture:
         self._watch()
         self._error = error
         show_error(f"The scene could not be simulated: {error}")
-
-
-def _timer(milliseconds: int, then: Callable[[], None]) -> QTimer:
-    timer = QTimer()
-    timer.setSingleShot(True)
-    timer.setInterval(milliseconds)
-    timer.timeout.connect(then)
-    return timer

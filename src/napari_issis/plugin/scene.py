@@ -13,7 +13,7 @@ from napari.layers import Image
 from napari.utils.events import EmitterGroup, Event
 from napari.utils.notifications import show_info
 from napari.viewer import Viewer
-from qtpy.QtCore import QEventLoop, QTimer
+from qtpy.QtCore import QEventLoop
 from qtpy.QtWidgets import QApplication
 
 from ..exposure import Exposure
@@ -27,6 +27,7 @@ from .live_picture import LivePicture, SceneNow
 from .marks import MARKER
 from .picture import Picture
 from .pointer import Pointer
+from .single_shot import single_shot
 from .source_columns import of_kind
 from .table import master_table, put
 from .units import Units
@@ -90,19 +91,11 @@ class Scene:
         self._set_up = 0
         self._told_version = 0
         self._told_missing: tuple[str, ...] = ()
-        self._timer = QTimer()
-        self._timer.setSingleShot(True)
-        self._timer.timeout.connect(self._refresh)
-        self._zoomed = QTimer()
-        self._zoomed.setSingleShot(True)
-        self._zoomed.setInterval(ZOOM_PAUSE)
-        self._zoomed.timeout.connect(self._follow_zoom)
+        self._timer = single_shot(self._refresh)
+        self._zoomed = single_shot(self._follow_zoom, ZOOM_PAUSE)
         viewer.scene.camera.events.zoom.connect(self._zoom_changed)
         self._keys = LayerKeys(self)
-        self._burst = QTimer()
-        self._burst.setSingleShot(True)
-        self._burst.setInterval(BURST)
-        self._burst.timeout.connect(self._end_nudge)
+        self._burst = single_shot(self._end_nudge, BURST)
 
         self.pointer = Pointer(self)
         viewer.layers.events.removed.connect(self._layer_removed)

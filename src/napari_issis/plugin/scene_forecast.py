@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from astropy.table import QTable
 from napari.utils.notifications import show_error
-from qtpy.QtCore import QObject, QTimer, Signal
+from qtpy.QtCore import QObject, Signal
 
 from ..observation import Observation
 from .latest_wins import LatestWins
 from .scene import Scene
+from .single_shot import single_shot
 
 # Milliseconds of rest before a forecast; and during a drag none is made.
 REST = 200
@@ -62,10 +63,7 @@ class SceneForecast(QObject):  # type: ignore[misc]
         self._made_for: object = None
         self._asked_for: object = None
         self._jobs = LatestWins(self._deliver, self._failed)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(REST)
-        self._timer.timeout.connect(self._request)
+        self._timer = single_shot(self._request, REST, self)
 
     @property
     def _now(self) -> object:

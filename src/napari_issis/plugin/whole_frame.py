@@ -6,9 +6,9 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from qtpy.QtCore import QTimer
 
 from .canvas_geometry import to_view_box, view_box
+from .single_shot import single_shot
 from .zoom import Zoom
 
 # pixels on the screen that may be cut off
@@ -30,9 +30,7 @@ class WholeFrame:
         self._zoom, self._scene = zoom, zoom.scene
         self._was_whole = False
         self._fitted: tuple[Any, ...] | None = None
-        self._settled = QTimer()
-        self._settled.setSingleShot(True)
-        self._settled.timeout.connect(self._fit)
+        self._settled = single_shot(self._fit)
 
     def resume(self) -> None:
         """Follow canvas and camera."""
